@@ -1,0 +1,28 @@
+# `make drive` and `make test` set everything up by themselves on a machine with Python 3.11-3.13.
+PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || echo python3)
+BIN := .venv/bin
+READY := .venv/.ready
+ARGS ?=
+
+.PHONY: drive test lint clean
+drive: $(READY)
+	$(BIN)/caldrive drive --cars 20 --people 50 --task one-turn --out out/drive $(ARGS)
+
+test: $(READY) lint
+	$(BIN)/pytest -n 2 $(ARGS)
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
+		{ echo "Found $$($(PYTHON) --version), need Python 3.11 to 3.13: install one or run make PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,test]'
+	touch $(READY)
+
+clean:
+	rm -rf .venv out

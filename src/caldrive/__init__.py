@@ -1,0 +1,3 @@
+"""caldrive: Conditional Affordance Learning for urban driving."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,287 @@
+"""The vocabulary that every part of caldrive shares: frozen dataclasses and three protocols.
+
+Units are SI, axes are ISO 8855: x forward (or east), y left (or north), headings counter-clockwise in radians.
+Speeds on signs are the one exception: they are the km/h that stand on the sign.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]  # (H, W, 3), RGB
+Points = NDArray[np.float64]  # (N, 2), metres
+
+SPEED_SIGNS = (30, 60, 90)  # km/h
+MAX_VEHICLE_DISTANCE = 50.0  # m, also the value for "no vehicle ahead" (Fig. 3 of the paper)
+MAX_CENTER_DISTANCE = 2.0  # m
+
+
+class Command(Enum):
+    """What the navigation system asks for at the next junction (section 3)."""
+
+    LEFT = "left"
+    STRAIGHT = "straight"
+    RIGHT = "right"
+
+
+class LightState(Enum):
+    GREEN = "green"
+    YELLOW = "yellow"
+    RED = "red"
+
+
+class ContactKind(Enum):
+    OBJECT = "object"
+    CAR = "car"
+    PERSON = "person"
+
+
+class DriveState(Enum):
+    """States of the longitudinal controller in ascending importance (section 3.2), and a last resort."""
+
+    CRUISING = "cruising"
+    FOLLOWING = "following"
+    OVER_LIMIT = "over limit"
+    RED_LIGHT = "red light"
+    HAZARD_STOP = "hazard stop"
+    BLIND = "blind"
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position of a body's centre (m) and its heading (rad, counter-clockwise from the x axis)."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True)
+class VehicleState:
+    """An oriented box on the road: centre pose, speed along the heading (m/s), length and width (m)."""
+
+    pose: Pose
+    speed: float = 0.0
+    length: float = 4.5
+    width: float = 1.8
+    id: str = ""
+
+
+@dataclass(frozen=True)
+class PedestrianState:
+    """A person: centre pose, walking speed (m/s), radius (m) and whether they are on the roadway."""
+
+    pose: Pose
+    speed: float = 0.0
+    radius: float = 0.3
+    on_road: bool = False
+    id: str = ""
+
+
+@dataclass(frozen=True)
+class Sign:
+    """A speed sign: foot of its post, heading of the traffic that it faces, and the limit in km/h."""
+
+    pose: Pose
+    limit: int
+
+
+@dataclass(frozen=True)
+class TrafficLight:
+    """A light on its post: foot of the post, heading of the traffic that it faces, state, and the ends of its stop line."""
+
+    id: str
+    pose: Pose
+    state: LightState
+    stop_line: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Control:
+    """What the driver does. throttle and brake in [0, 1], steer in [-1, 1] with + to the left."""
+
+    throttle: float = 0.0
+    brake: float = 0.0
+    steer: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, low in (("throttle", 0.0), ("brake", 0.0), ("steer", -1.0)):
+            value = getattr(self, name)
+            if not low <= value <= 1.0:
+                raise ValueError(f"{name} is {value}, but must lie in [{low:g}, 1]: clip it before making a Control")
+
+
+@dataclass(frozen=True)
+class Affordances:
+    """The six affordances (section 3, Fig. 3): one type for labels and for predictions.
+
+    hazard_stop, red_light: probabilities; a label is 0.0 or 1.0.
+    speed_sign: None, 30, 60 or 90 km/h.
+    vehicle_distance: bumper to bumper in m, 50 where nobody is ahead.
+    relative_angle: heading of the route minus heading of the car, rad; + means the road bends away to the left.
+    center_distance: from the middle of the front axle to the centre line, m; + means that the line lies to the left.
+    """
+
+    hazard_stop: float = 0.0
+    red_light: float = 0.0
+    speed_sign: int | None = None
+    vehicle_distance: float = MAX_VEHICLE_DISTANCE
+    relative_angle: float = 0.0
+    center_distance: float = 0.0
+
+
+@dataclass(frozen=True)
+class Observation:
+    """All that an agent may see: time (s), image (H, W, 3), speed (m/s) and the command."""
+
+    time: float
+    image: Image
+    speed: float
+    command: Command
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The ego touches something: what, which one, impulse (N s), and whether the ego's moving front or side did it."""
+
+    kind: ContactKind
+    id: str
+    impulse: float
+    at_fault: bool
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What really is, for referee, recorder and oracle.
+
+    opposite_share, sidewalk_share: shares in [0, 1] of the car's area on the opposite lane and on the sidewalk.
+    route_done, route_length: metres along the route. goal_distance: straight line to the goal, m.
+    """
+
+    time: float
+    ego: VehicleState
+    affordances: Affordances
+    vehicles: tuple[VehicleState, ...] = ()
+    pedestrians: tuple[PedestrianState, ...] = ()
+    lights: tuple[TrafficLight, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    opposite_share: float = 0.0
+    sidewalk_share: float = 0.0
+    route_done: float = 0.0
+    route_length: float = math.inf
+    goal_distance: float = math.inf
+    speed_limit: float = 30.0  # km/h, the lawful one at this place
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One episode's conditions. town: a name or the path of an .xodr file. time_limit in s. crossing: how many times
+    as often as usual pedestrians cross."""
+
+    town: str
+    weather: int
+    start: Pose
+    goal: Pose
+    n_vehicles: int = 0
+    n_pedestrians: int = 0
+    time_limit: float = math.inf
+    seed: int = 0
+    task: str = ""
+    crossing: float = 1.0
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Why a control was chosen: the affordances it rests on, the state, limit and target in km/h, a note if any."""
+
+    control: Control
+    affordances: Affordances
+    state: DriveState
+    speed_limit: float
+    target_speed: float
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One turn of the loop: what was seen, what was true, what was done, and the reasons if the agent gives any."""
+
+    observation: Observation
+    truth: Truth
+    control: Control
+    decision: Decision | None = None
+
+
+class Outcome(Enum):
+    """How an episode ended, as a message."""
+
+    SUCCESS = "reached the goal in time"
+    TIMEOUT = "ran out of time"
+    ABORTED = "was stopped before its end"
+
+
+class InfractionKind(Enum):
+    """The paper's six kinds of infraction (section 3)."""
+
+    OPPOSITE_LANE = "opposite lane"
+    SIDEWALK = "sidewalk"
+    RED_LIGHT = "red light"
+    COLLISION_OBJECT = "collision with object"
+    COLLISION_CAR = "collision with car"
+    COLLISION_PERSON = "collision with person"
+
+
+@dataclass(frozen=True)
+class Infraction:
+    kind: InfractionKind
+    time: float
+    x: float
+    y: float
+    at_fault: bool = True
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """duration in s, distance in m, route_done and route_length in m, comfort: figures by name."""
+
+    scenario: Scenario
+    outcome: Outcome
+    duration: float
+    distance: float
+    route_done: float
+    route_length: float
+    infractions: tuple[Infraction, ...] = ()
+    comfort: dict[str, float] = field(default_factory=dict)
+
+
+class World(Protocol):
+    """A place to drive. dt: seconds of one step."""
+
+    dt: float
+
+    def reset(self, scenario: Scenario) -> Observation: ...
+    def step(self, control: Control) -> Observation: ...
+    def truth(self) -> Truth: ...
+    def close(self) -> None: ...
+
+
+class Perception(Protocol):
+    """Image to affordances. reset() starts an episode."""
+
+    def reset(self) -> None: ...
+    def predict(self, observation: Observation) -> Affordances: ...
+
+
+class Agent(Protocol):
+    """A driver. decision holds the reasons for the last control, where the agent has any."""
+
+    decision: Decision | None
+
+    def reset(self) -> None: ...
+    def act(self, observation: Observation) -> Control: ...

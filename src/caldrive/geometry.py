@@ -1,0 +1,145 @@
+"""Plane geometry: angles, frames, oriented boxes and polylines. Pure functions over numpy arrays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.datatypes import Points, Pose
+
+
+def wrap_angle(angle: float) -> float:
+    """The same angle in (-pi, pi]."""
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+def to_local(frame: Pose, points: Points) -> Points:
+    """World points (N, 2) seen from a frame: x ahead of it, y to its left."""
+    c, s = math.cos(frame.heading), math.sin(frame.heading)
+    d = np.asarray(points, dtype=float) - (frame.x, frame.y)
+    return np.stack((c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1]), axis=-1)
+
+
+def to_world(frame: Pose, points: Points) -> Points:
+    """Points (N, 2) of a frame in the world: the inverse of `to_local`."""
+    c, s = math.cos(frame.heading), math.sin(frame.heading)
+    p = np.asarray(points, dtype=float)
+    return np.stack((c * p[..., 0] - s * p[..., 1] + frame.x, s * p[..., 0] + c * p[..., 1] + frame.y), axis=-1)
+
+
+def moved(pose: Pose, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> Pose:
+    """The pose after going forward and left (m), then turning (rad), all in its own frame."""
+    x, y = to_world(pose, np.array([forward, left]))
+    return Pose(float(x), float(y), wrap_angle(pose.heading + turn))
+
+
+def box_corners(pose: Pose, length: float, width: float) -> Points:
+    """Corners (4, 2) of a box centred on a pose, counter-clockwise from front left."""
+    a, b = length / 2, width / 2
+    return to_world(pose, np.array([(a, b), (-a, b), (-a, -b), (a, -b)]))
+
+
+def boxes_overlap(first: Points, second: Points) -> bool:
+    """Whether two convex polygons (N, 2) share a point: the separating axis theorem."""
+    for polygon in (first, second):
+        edges = np.roll(polygon, -1, axis=0) - polygon
+        axes = np.stack((-edges[:, 1], edges[:, 0]), axis=1)
+        p, q = first @ axes.T, second @ axes.T
+        if np.any((p.max(0) < q.min(0)) | (q.max(0) < p.min(0))):
+            return False
+    return True
+
+
+def _points_to_segments(points: Points, starts: Points, ends: Points) -> NDArray[np.float64]:
+    """Distances (N, M) from N points to M segments."""
+    along = ends - starts
+    t = ((points[:, None] - starts) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12)
+    nearest = starts + np.clip(t, 0, 1)[..., None] * along
+    return np.asarray(np.linalg.norm(points[:, None] - nearest, axis=-1))
+
+
+def polygon_distance(first: Points, second: Points) -> float:
+    """Shortest distance between two convex polygons in metres, 0 where they overlap."""
+    if boxes_overlap(first, second):
+        return 0.0
+    one = _points_to_segments(first, second, np.roll(second, -1, axis=0))
+    two = _points_to_segments(second, first, np.roll(first, -1, axis=0))
+    return float(min(one.min(), two.min()))
+
+
+def segments_cross(a: Points, b: Points) -> bool:
+    """Whether segment a (2, 2) properly crosses segment b (2, 2)."""
+
+    def side(p: Points, q: Points, r: Points) -> float:
+        return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+
+    return side(a[0], a[1], b[0]) * side(a[0], a[1], b[1]) < 0 and side(b[0], b[1], a[0]) * side(b[0], b[1], a[1]) < 0
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Where a point meets a polyline: s along it (m), left of it (m, + left), and the tangent's heading there."""
+
+    s: float
+    left: float
+    heading: float
+
+
+class Polyline:
+    """A directed line through points (N, 2), N >= 2, measured by arc length s in metres."""
+
+    def __init__(self, points: Points) -> None:
+        points = np.asarray(points, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ValueError(f"a polyline needs points of shape (N, 2), found {points.shape}")
+        keep = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6))
+        self.points: Points = points[keep]
+        if len(self.points) < 2:
+            raise ValueError(f"a polyline needs two different points, found {len(self.points)}")
+        steps = np.diff(self.points, axis=0)
+        self.headings = np.arctan2(steps[:, 1], steps[:, 0])
+        self.s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
+
+    @property
+    def length(self) -> float:
+        return float(self.s[-1])
+
+    def _segment(self, s: float) -> int:
+        return int(np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.headings) - 1))
+
+    def heading_at(self, s: float) -> float:
+        """The tangent's heading at s, turning evenly from the middle of one segment to the middle of the next."""
+        i = self._segment(s)
+        middle = (self.s[i] + self.s[i + 1]) / 2
+        j = i + (1 if s >= middle else -1)
+        if not 0 <= j < len(self.headings):
+            return float(self.headings[i])
+        other = (self.s[j] + self.s[j + 1]) / 2
+        share = (s - middle) / (other - middle)
+        return wrap_angle(self.headings[i] + share * wrap_angle(self.headings[j] - self.headings[i]))
+
+    def pose_at(self, s: float) -> Pose:
+        """The pose on the line at s; beyond its ends, straight on."""
+        i = self._segment(s)
+        heading = self.headings[i]
+        x, y = self.points[i] + (s - self.s[i]) * np.array([math.cos(heading), math.sin(heading)])
+        return Pose(float(x), float(y), self.heading_at(s))
+
+    def project(self, x: float, y: float, near: float | None = None, window: float = 15.0) -> Projection:
+        """The closest place to a point; with `near`, only within `window` metres of that arc length."""
+        first, last = 0, len(self.headings)
+        if near is not None:
+            first, last = self._segment(near - window), self._segment(near + window) + 1
+        start, end = self.points[first:last], self.points[first + 1 : last + 1]
+        along = end - start
+        t = np.clip(((np.array([x, y]) - start) * along).sum(1) / (along**2).sum(1), 0, 1)
+        offset = np.array([x, y]) - (start + t[:, None] * along)
+        k = int(np.argmin((offset**2).sum(1)))
+        s = float(self.s[first + k] + t[k] * np.linalg.norm(along[k]))
+        left = float(along[k, 0] * offset[k, 1] - along[k, 1] * offset[k, 0])
+        distance = float(np.linalg.norm(offset[k]))
+        return Projection(s, math.copysign(distance, left), self.heading_at(s))
