@@ -1,0 +1,84 @@
+"""What SUMO does not take from an OpenDRIVE map: where its speed signs and its traffic lights stand."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from caldrive.datatypes import SPEED_SIGNS, Pose, Sign
+from caldrive.geometry import moved, wrap_angle
+
+_LIGHT_TYPE = "1000001"  # OpenDRIVE's own number for a three-lamp light
+_SPEED_TYPE = "274"  # the German catalogue's number for a limit, which OpenDRIVE files use
+
+
+def _number(element: ET.Element, name: str) -> float:
+    return float(element.get(name) or 0.0)
+
+
+def _along(geometry: ET.Element, ds: float) -> Pose:
+    """The reference line's pose ds metres into a geometry: line, arc, spiral or paramPoly3."""
+    start = Pose(_number(geometry, "x"), _number(geometry, "y"), _number(geometry, "hdg"))
+    shape = geometry[0]
+    if shape.tag == "paramPoly3":
+        return _along_polynomial(start, shape, ds, _number(geometry, "length"))
+    first = last = 0.0
+    if shape.tag == "arc":
+        first = last = _number(shape, "curvature")
+    elif shape.tag == "spiral":
+        first = _number(shape, "curvStart")
+        share = ds / max(_number(geometry, "length"), 1e-9)
+        last = first + share * (_number(shape, "curvEnd") - first)
+    s = np.linspace(0, ds, 65)
+    heading = start.heading + first * s + (last - first) * s**2 / (2 * max(ds, 1e-9))
+    x, y = np.trapezoid(np.cos(heading), s), np.trapezoid(np.sin(heading), s)
+    return Pose(start.x + float(x), start.y + float(y), wrap_angle(float(heading[-1])))
+
+
+def _along_polynomial(start: Pose, shape: ET.Element, ds: float, length: float) -> Pose:
+    p = ds if shape.get("pRange") == "arcLength" else ds / length
+    u, v = ([_number(shape, f"{k}{axis}") for k in "dcba"] for axis in "UV")
+    turn = math.atan2(float(np.polyval(np.polyder(v), p)), float(np.polyval(np.polyder(u), p)))
+    return moved(start, float(np.polyval(u, p)), float(np.polyval(v, p)), turn)
+
+
+def _standing(road: ET.Element, thing: ET.Element, heading_name: str) -> Pose:
+    """Pose of a sign or signal; heading: that of the traffic it faces."""
+    s, t = _number(thing, "s"), _number(thing, "t")
+    geometries = road.findall("planView/geometry")
+    here = [g for g in geometries if _number(g, "s") <= s + 1e-6][-1]
+    offset = 0.0 if t < 0 else math.pi
+    if thing.get(heading_name):
+        offset = _number(thing, heading_name)
+    return moved(_along(here, s - _number(here, "s")), left=t, turn=offset)
+
+
+def _limit(thing: ET.Element) -> int | None:
+    """The limit on a sign, from a name such as Speed_30 or from type 274 and its value, if it is one of ours."""
+    named = re.search(r"[Ss]peed[^0-9]*(\d+)", thing.get("name") or "")
+    value = float(named.group(1)) if named else _number(thing, "value") if thing.get("type") == _SPEED_TYPE else 0.0
+    return int(value) if value in SPEED_SIGNS else None
+
+
+def read_furniture(path: Path) -> tuple[list[Pose], list[Sign]]:
+    """Posts of traffic lights and speed signs of an OpenDRIVE map, each once. Raises ValueError for a broken file."""
+    try:
+        root = ET.parse(path).getroot()
+    except ET.ParseError as error:
+        raise ValueError(f"{path} is no readable OpenDRIVE map ({error}): give another .xodr file") from error
+    if root.tag != "OpenDRIVE":
+        raise ValueError(f"{path} holds <{root.tag}>, wanted <OpenDRIVE>: give an .xodr file")
+    posts, signs = [], {}
+    for road in root.findall("road"):
+        for thing in [*road.findall("signals/signal"), *road.findall("objects/object")]:
+            limit = _limit(thing)
+            if limit is not None:
+                pose = _standing(road, thing, "hOffset" if thing.tag == "signal" else "hdg")
+                signs[(round(pose.x), round(pose.y), limit)] = Sign(pose, limit)
+            elif thing.tag == "signal" and thing.get("type") == _LIGHT_TYPE:
+                posts.append(_standing(road, thing, "hOffset"))
+    return posts, list(signs.values())
