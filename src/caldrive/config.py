@@ -34,11 +34,161 @@ class VehicleConfig:
     front_axle: float = 1.3  # m ahead of the centre
     max_steer: float = 0.6109  # 35°
     steer_rate: float = 2.0
-    max_acceleration: float = 4.2
+    max_acceleration: float = 3.8  # at standstill; the thrust falls evenly to 0 at top_speed
     max_brake: float = 8.0
     top_speed: float = 45.0
     throttle_lag: float = 0.25
     brake_lag: float = 0.08
-    drag: float = 0.004
+    max_lateral: float = 8.0  # m/s², what the tyres give before the car understeers
+    drag: float = 0.0008  # 1/m
     rolling: float = 0.25
     mass: float = 1400.0
+
+
+@dataclass(frozen=True)
+class PIDGains:
+    """Parallel form: kp per unit of error, ki per unit and second, kd in seconds per unit.
+
+    low, high: limits of the output. filter_time: time constant in s of the low pass on the derivative.
+    """
+
+    kp: float
+    ki: float
+    kd: float = 0.0
+    low: float = -1.0
+    high: float = 1.0
+    filter_time: float = 0.2
+
+
+@dataclass(frozen=True)
+class LongitudinalConfig:
+    """The five states' thresholds and laws. Speeds in km/h, distances in m; see control/presets.py for the reasons."""
+
+    cruise: PIDGains = PIDGains(0.09, 0.02, 0.0, low=-0.3)
+    follow: PIDGains = PIDGains(0.09, 0.01, 0.0)
+    turn_reduction: float = 0.0
+    turn_speed: float = 15.0
+    follow_distance: float = 45.0
+    follow_c: float = 3.0
+    follow_d: float = 0.0
+    follow_gap: float = 5.5
+    over_limit_margin: float = 3.0
+    over_limit_ratio: float = 0.0
+    over_limit_gain: float = 0.03
+    red_threshold: float = 0.9
+    red_gain: float = 1.5
+    red_floor: float = 0.8
+    hazard_threshold: float = 0.7
+    hold_speed: float = 1.0
+    hold_brake: float = 0.3
+
+
+@dataclass(frozen=True)
+class LateralConfig:
+    """The Stanley law: (gain in 1/s, damping) of each command, floor of the speed in m/s, largest angle in rad."""
+
+    left: tuple[float, float] = (0.5, 0.05)
+    right: tuple[float, float] = (1.0, 0.075)
+    straight: tuple[float, float] = (1.0, 0.1)
+    speed_floor: float = 2.0
+    max_angle: float = 0.6109  # 35°
+
+
+@dataclass(frozen=True)
+class ControlConfig:
+    """The controller. initial_limit: km/h before the first sign. cap: km/h that no limit exceeds, None for no cap.
+
+    blind_brake: brake in [0, 1] where an affordance is not a number.
+    """
+
+    longitudinal: LongitudinalConfig = LongitudinalConfig()
+    lateral: LateralConfig = LateralConfig()
+    initial_limit: float = 30.0
+    cap: float | None = None
+    blind_brake: float = 0.5
+
+
+@dataclass(frozen=True)
+class BlockConfig:
+    """A task block: kind of layer (dense, lstm, gru or tconv), its nodes (for each command where the affordance is
+    conditional), dropout ratio, length of its sequence in frames and dilation (2: every other frame)."""
+
+    layer: str = "dense"
+    nodes: int = 64
+    dropout: float = 0.25
+    length: int = 1
+    dilation: int = 1
+
+    @property
+    def span(self) -> int:
+        """Frames from the oldest one that the block looks at to the newest, both included."""
+        return (self.length - 1) * self.dilation + 1
+
+
+@dataclass(frozen=True)
+class PerceptionConfig:
+    """The network: image size in pixels, width of the convolutions as a share of VGG16's, batch norm in the backbone,
+    and one task block for each affordance. The default is the small network that is trained from scratch."""
+
+    image_width: int = 200
+    image_height: int = 88
+    width: float = 0.25
+    batch_norm: bool = True
+    hazard_stop: BlockConfig = BlockConfig("tconv", 64, 0.25, length=3)
+    red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
+    speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
+    vehicle_distance: BlockConfig = BlockConfig("tconv", 64, 0.1, length=3)
+    relative_angle: BlockConfig = BlockConfig("dense", 64, 0.1)
+    center_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
+
+
+PERCEPTIONS = {
+    "small": PerceptionConfig(),
+    # The best task blocks of the paper's supplement (table of best task block parameters) on VGG16 as it is.
+    "paper": PerceptionConfig(
+        image_width=320,
+        image_height=144,
+        width=1.0,
+        batch_norm=False,
+        hazard_stop=BlockConfig("tconv", 160, 0.68, length=6),
+        red_light=BlockConfig("gru", 185, 0.27, length=14, dilation=2),
+        speed_sign=BlockConfig("dense", 160, 0.55),
+        vehicle_distance=BlockConfig("gru", 160, 0.38, length=11),
+        relative_angle=BlockConfig("tconv", 100, 0.44, length=10),
+        center_distance=BlockConfig("tconv", 100, 0.44, length=10),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
+
+    batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
+    balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
+    cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu or cuda.
+    """
+
+    steps: int = 4000
+    batch: int = 32
+    window: int = 4
+    learning_rate: float = 1e-3
+    warm_up: int = 200
+    final_rate: float = 0.02
+    clip: float = 5.0
+    balance: float = 0.5
+    augment: bool = True
+    validation_share: float = 0.05
+    evaluate_every: int = 500
+    save_every: int = 100
+    cache_gb: float = 4.0
+    precision: str = "auto"
+    device: str = "cpu"
+    seed: int = 0
+
+
+TRAININGS = {
+    "small": TrainingConfig(),
+    # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
+    "paper": TrainingConfig(steps=75_000, window=1, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0),
+}

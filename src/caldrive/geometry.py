@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +34,9 @@ def to_world(frame: Pose, points: Points) -> Points:
 
 def moved(pose: Pose, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> Pose:
     """The pose after going forward and left (m), then turning (rad), all in its own frame."""
-    x, y = to_world(pose, np.array([forward, left]))
-    return Pose(float(x), float(y), wrap_angle(pose.heading + turn))
+    c, s = math.cos(pose.heading), math.sin(pose.heading)
+    x, y = pose.x + c * forward - s * left, pose.y + s * forward + c * left
+    return Pose(x, y, wrap_angle(pose.heading + turn))
 
 
 def box_corners(pose: Pose, length: float, width: float) -> Points:
@@ -100,46 +102,65 @@ class Polyline:
         self.points: Points = points[keep]
         if len(self.points) < 2:
             raise ValueError(f"a polyline needs two different points, found {len(self.points)}")
-        steps = np.diff(self.points, axis=0)
-        self.headings = np.arctan2(steps[:, 1], steps[:, 0])
-        self.s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
+        self._along = np.diff(self.points, axis=0)
+        self._squares = (self._along**2).sum(1)
+        self.s = np.concatenate(([0.0], np.cumsum(np.sqrt(self._squares))))
+        self.headings = np.arctan2(self._along[:, 1], self._along[:, 0])
+        # Single places are looked up in lists, which is several times faster than in arrays.
+        self._s: list[float] = self.s.tolist()
+        self._h: list[float] = self.headings.tolist()
+        self._xy: list[list[float]] = self.points.tolist()
 
     @property
     def length(self) -> float:
         return float(self.s[-1])
 
     def _segment(self, s: float) -> int:
-        return int(np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.headings) - 1))
+        return min(max(bisect_right(self._s, s) - 1, 0), len(self._h) - 1)
 
     def heading_at(self, s: float) -> float:
         """The tangent's heading at s, turning evenly from the middle of one segment to the middle of the next."""
         i = self._segment(s)
-        middle = (self.s[i] + self.s[i + 1]) / 2
+        middle = (self._s[i] + self._s[i + 1]) / 2
         j = i + (1 if s >= middle else -1)
-        if not 0 <= j < len(self.headings):
-            return float(self.headings[i])
-        other = (self.s[j] + self.s[j + 1]) / 2
+        if not 0 <= j < len(self._h):
+            return self._h[i]
+        other = (self._s[j] + self._s[j + 1]) / 2
         share = (s - middle) / (other - middle)
-        return wrap_angle(self.headings[i] + share * wrap_angle(self.headings[j] - self.headings[i]))
+        return wrap_angle(self._h[i] + share * wrap_angle(self._h[j] - self._h[i]))
 
     def pose_at(self, s: float) -> Pose:
         """The pose on the line at s; beyond its ends, straight on."""
         i = self._segment(s)
-        heading = self.headings[i]
-        x, y = self.points[i] + (s - self.s[i]) * np.array([math.cos(heading), math.sin(heading)])
-        return Pose(float(x), float(y), self.heading_at(s))
+        (x, y), ahead, heading = self._xy[i], s - self._s[i], self._h[i]
+        return Pose(x + ahead * math.cos(heading), y + ahead * math.sin(heading), self.heading_at(s))
 
     def project(self, x: float, y: float, near: float | None = None, window: float = 15.0) -> Projection:
         """The closest place to a point; with `near`, only within `window` metres of that arc length."""
-        first, last = 0, len(self.headings)
+        first, last = 0, len(self._h)
         if near is not None:
             first, last = self._segment(near - window), self._segment(near + window) + 1
-        start, end = self.points[first:last], self.points[first + 1 : last + 1]
-        along = end - start
-        t = np.clip(((np.array([x, y]) - start) * along).sum(1) / (along**2).sum(1), 0, 1)
-        offset = np.array([x, y]) - (start + t[:, None] * along)
-        k = int(np.argmin((offset**2).sum(1)))
-        s = float(self.s[first + k] + t[k] * np.linalg.norm(along[k]))
-        left = float(along[k, 0] * offset[k, 1] - along[k, 1] * offset[k, 0])
-        distance = float(np.linalg.norm(offset[k]))
-        return Projection(s, math.copysign(distance, left), self.heading_at(s))
+        along, d = self._along[first:last], (x, y) - self.points[first:last]
+        t = np.minimum(np.maximum((d * along).sum(1) / self._squares[first:last], 0.0), 1.0)
+        offset = d - t[:, None] * along
+        k = int((offset**2).sum(1).argmin())
+        (u, v), (p, q) = along[k].tolist(), offset[k].tolist()
+        s = self._s[first + k] + float(t[k]) * math.hypot(u, v)
+        return Projection(s, math.copysign(math.hypot(p, q), u * q - v * p), self.heading_at(s))
+
+
+def push_out(moving: Points, fixed: Points) -> Points | None:
+    """The shortest shift (2,) that takes a convex polygon out of another, or None where they do not overlap."""
+    best: Points | None = None
+    for polygon in (moving, fixed):
+        edges = np.roll(polygon, -1, axis=0) - polygon
+        axes = np.stack((-edges[:, 1], edges[:, 0]), axis=1) / np.linalg.norm(edges, axis=1)[:, None]
+        p, q = moving @ axes.T, fixed @ axes.T
+        ahead, behind = q.max(0) - p.min(0), p.max(0) - q.min(0)
+        if np.any((ahead < 0) | (behind < 0)):
+            return None
+        shifts = np.where(ahead < behind, ahead, -behind)
+        k = int(np.argmin(np.abs(shifts)))
+        if best is None or abs(shifts[k]) < np.linalg.norm(best):
+            best = shifts[k] * axes[k]
+    return best

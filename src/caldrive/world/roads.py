@@ -55,7 +55,7 @@ class LightPost:
         return f"{self.light}/{self.lane}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RoadNetwork:
     """A town's roads. network: the SUMO file. style: which look the camera gives it."""
 

@@ -1,0 +1,45 @@
+"""Two controllers: PAPER as printed (section 3.2, supplement 1.2), and DEFAULT, which drives better.
+
+Where DEFAULT differs, and why:
+
+    what                    PAPER                DEFAULT             reason
+    target in turns         limit - 10 km/h      at most 15 km/h     below a cap of 20 the paper's rule creeps at 10, in
+                                                                     a 60 zone it takes the turn at 50
+    brake in cruising       none                 up to 0.3           holds a falling target without waiting for drag
+    following from          35 m                 45 m                at 90 km/h a stop takes 44 m
+    standing gap            v_max / 6            5.5 m               a car's centre enters A2 at 5.2 m from bumper to
+                                                                     bumper: a queue should not be a hazard stop, and
+                                                                     3 m at a limit of 20 would be
+    held at standstill      by the PID           brake 0.3           below 1 km/h asked and driven: a queue does not
+                                                                     creep or roll
+    over limit from         15 km/h too fast     3 km/h too fast     45 in a 30 zone is not lawful
+    over limit, brake       0.3 v / v*           0.03 (v - v_safe)   ends gently at the limit; heeds a car ahead, too
+    red light, brake        0.2 v / 30           1.5 v / 30, >= 0.8  area A1 leaves 6.6 m to stand in; 0.2 v / 30 takes
+                                                                     about 30 m from 30 km/h
+    PID gains               the authors'         by step responses   less than 1 km/h too fast from 20 to 90 km/h
+"""
+
+from __future__ import annotations
+
+from caldrive.config import ControlConfig, LongitudinalConfig, PIDGains
+
+DEFAULT = ControlConfig()
+
+PAPER = ControlConfig(
+    longitudinal=LongitudinalConfig(
+        cruise=PIDGains(0.06, 0.026, 0.014, low=0.0),
+        follow=PIDGains(0.16, 0.08, 0.01),
+        turn_reduction=10.0,
+        turn_speed=float("inf"),
+        follow_distance=35.0,
+        follow_d=-0.5,
+        follow_gap=0.0,
+        over_limit_margin=15.0,
+        over_limit_ratio=0.3,
+        over_limit_gain=0.0,
+        red_gain=0.2,
+        red_floor=0.0,
+        hold_speed=0.0,
+        hold_brake=0.0,
+    )
+)

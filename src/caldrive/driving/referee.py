@@ -1,0 +1,163 @@
+"""The referee: watches the truth and nothing else, says when an episode ends and which rules were broken.
+
+Counting follows the CoRL-2017 benchmark: a lane or sidewalk infraction is a rise of the car's share there within 10
+frames, a collision an impulse above a threshold, and each kind then rests for some frames before it counts again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from caldrive.datatypes import (
+    ContactKind,
+    EpisodeResult,
+    Infraction,
+    InfractionKind,
+    LightState,
+    Outcome,
+    Scenario,
+    TrafficLight,
+    Truth,
+    VehicleState,
+)
+from caldrive.geometry import wrap_angle
+
+GOAL_RADIUS = 2.0  # m
+RISE_FRAMES = 10
+REST_FRAMES = {
+    InfractionKind.OPPOSITE_LANE: 20,
+    InfractionKind.SIDEWALK: 20,
+    InfractionKind.RED_LIGHT: 20,
+    InfractionKind.COLLISION_OBJECT: 20,
+    InfractionKind.COLLISION_CAR: 30,
+    InfractionKind.COLLISION_PERSON: 100,
+}
+SHARE_RISE = {InfractionKind.OPPOSITE_LANE: 0.4, InfractionKind.SIDEWALK: 0.3}
+COLLISIONS = {  # kind and impulse in N s above which it counts
+    ContactKind.OBJECT: (InfractionKind.COLLISION_OBJECT, 400.0),
+    ContactKind.CAR: (InfractionKind.COLLISION_CAR, 400.0),
+    ContactKind.PERSON: (InfractionKind.COLLISION_PERSON, 300.0),
+}
+LIGHT_ANGLE = math.radians(60)  # a light further off the ego's heading is for others
+
+
+def front(ego: VehicleState) -> tuple[float, float]:
+    """The middle of the front bumper."""
+    reach = ego.length / 2
+    return ego.pose.x + reach * math.cos(ego.pose.heading), ego.pose.y + reach * math.sin(ego.pose.heading)
+
+
+def crosses(light: TrafficLight, before: tuple[float, float], after: tuple[float, float]) -> bool:
+    """Whether a point that moves from before to after passes the stop line in the sense of the light's traffic."""
+    (ax, ay), (bx, by) = light.stop_line
+    length = math.hypot(bx - ax, by - ay)
+    tx, ty = (bx - ax) / length, (by - ay) / length
+    if -ty * math.cos(light.pose.heading) + tx * math.sin(light.pose.heading) < 0:
+        (ax, ay), (tx, ty) = (bx, by), (-tx, -ty)
+    behind, ahead = (-ty * (x - ax) + tx * (y - ay) for x, y in (before, after))
+    if not behind <= 0 < ahead:
+        return False
+    share = -behind / (ahead - behind)
+    x, y = (p + share * (q - p) for p, q in zip(before, after, strict=True))
+    return 0 <= tx * (x - ax) + ty * (y - ay) <= length
+
+
+def runs_red(light: TrafficLight, last: VehicleState, ego: VehicleState) -> bool:
+    """Whether the ego's front crossed this light's stop line while it showed red to the ego."""
+    turned = abs(wrap_angle(light.pose.heading - ego.pose.heading))
+    return light.state is LightState.RED and turned <= LIGHT_ANGLE and crosses(light, front(last), front(ego))
+
+
+def comfort(times: list[float], speeds: list[float], centers: list[float]) -> dict[str, float]:
+    """Figures of supplement 3.2 by name: median |centre distance| in m, RMS jerk along the road in m/s³."""
+    figures = {"center_distance": float(np.median(np.abs(centers))) if centers else 0.0, "jerk": 0.0}
+    if len(times) > 2:
+        dt = (times[-1] - times[0]) / (len(times) - 1)
+        figures["jerk"] = float(np.sqrt(np.mean((np.diff(speeds, n=2) / dt**2) ** 2)))
+    return figures
+
+
+class Referee:
+    """One episode's referee. infractions: those so far, each once, with its time and place."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.infractions: list[Infraction] = []
+        self.outcome: Outcome | None = None
+        self._frame = 0
+        self._counted: dict[InfractionKind, int] = {}  # frame of the last one of its kind
+        self._shares = {kind: deque[float](maxlen=RISE_FRAMES + 1) for kind in SHARE_RISE}
+        self._last: Truth | None = None
+        self._distance = 0.0
+        self._times: list[float] = []
+        self._speeds: list[float] = []
+        self._centers: list[float] = []
+
+    def watch(self, truth: Truth) -> Outcome | None:
+        """Take note of one frame; the outcome if the episode is over, else None."""
+        self._watch_shares(truth)
+        self._watch_contacts(truth)
+        self._watch_lights(truth)
+        self._note(truth)
+        if truth.goal_distance <= GOAL_RADIUS:
+            self.outcome = Outcome.SUCCESS
+        elif truth.time >= self.scenario.time_limit:
+            self.outcome = Outcome.TIMEOUT
+        return self.outcome
+
+    def result(self) -> EpisodeResult:
+        """How it went up to the last frame; an episode without an end counts as aborted."""
+        last = self._last
+        return EpisodeResult(
+            scenario=self.scenario,
+            outcome=self.outcome or Outcome.ABORTED,
+            duration=self._times[-1] - self._times[0] if self._times else 0.0,
+            distance=self._distance,
+            route_done=last.route_done if last else 0.0,
+            route_length=last.route_length if last else math.inf,
+            infractions=tuple(self.infractions),
+            comfort=comfort(self._times, self._speeds, self._centers),
+        )
+
+    def _watch_shares(self, truth: Truth) -> None:
+        shares = {
+            InfractionKind.OPPOSITE_LANE: truth.opposite_share,
+            InfractionKind.SIDEWALK: truth.sidewalk_share,
+        }
+        for kind, share in shares.items():
+            recent = self._shares[kind]
+            recent.append(share)
+            if share - min(recent) > SHARE_RISE[kind]:
+                self._count(kind, truth)
+
+    def _watch_contacts(self, truth: Truth) -> None:
+        for contact in truth.contacts:
+            kind, threshold = COLLISIONS[contact.kind]
+            if contact.impulse > threshold:
+                self._count(kind, truth, contact.at_fault)
+
+    def _watch_lights(self, truth: Truth) -> None:
+        if self._last is None:
+            return
+        if any(runs_red(light, self._last.ego, truth.ego) for light in truth.lights):
+            self._count(InfractionKind.RED_LIGHT, truth)
+
+    def _count(self, kind: InfractionKind, truth: Truth, at_fault: bool = True) -> None:
+        """One more infraction, unless one of its kind was counted a moment ago."""
+        if self._frame - self._counted.get(kind, -1000) <= REST_FRAMES[kind]:
+            return
+        self._counted[kind] = self._frame
+        self.infractions.append(Infraction(kind, truth.time, truth.ego.pose.x, truth.ego.pose.y, at_fault))
+
+    def _note(self, truth: Truth) -> None:
+        if self._last is not None:
+            before, now = self._last.ego.pose, truth.ego.pose
+            self._distance += math.hypot(now.x - before.x, now.y - before.y)
+        self._last = truth
+        self._frame += 1
+        self._times.append(truth.time)
+        self._speeds.append(truth.ego.speed)
+        self._centers.append(truth.affordances.center_distance)

@@ -1,0 +1,235 @@
+"""A recorded episode on disk, the only home of the format: one Parquet file, one row for each frame of each camera.
+
+Images are JPEG bytes. The scenario, the episode's id and the version of the format lie as JSON in the schema's
+metadata.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import simplejpeg
+from numpy.typing import NDArray
+
+from caldrive.datatypes import Affordances, Command, Control, Image, Pose, Scenario
+
+FORMAT_VERSION = 1
+METADATA_KEY = b"caldrive"
+JPEG_QUALITY = 90
+LABELS = tuple(f.name for f in fields(Affordances))
+CONTROLS = tuple(f.name for f in fields(Control))
+
+SCHEMA = pa.schema(
+    [
+        ("episode", pa.string()),
+        ("frame", pa.int64()),
+        ("camera", pa.int64()),
+        *((name, pa.float64()) for name in ("camera_left", "camera_yaw", "time", "speed")),
+        ("command", pa.string()),
+        *((name, pa.int64() if name == "speed_sign" else pa.float64()) for name in LABELS),
+        *((f"{kind}_{name}", pa.float64()) for kind in ("driven", "clean") for name in CONTROLS),
+        ("image", pa.binary()),
+    ]
+)
+
+
+class EpisodeError(ValueError):
+    """A recording cannot be read or written; the message says why."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One camera's view at one moment.
+
+    index: number of the moment, from 0. camera: its id, with its lateral offset (m, + left) and yaw (rad, + left).
+    affordances: the labels as of a car that stands where the camera looks from. driven: the control that moved the car,
+    clean: what the driver wanted before any noise was added.
+    """
+
+    index: int
+    time: float
+    speed: float
+    command: Command
+    affordances: Affordances
+    driven: Control
+    clean: Control
+    image: Image
+    camera: int = 0
+    camera_left: float = 0.0
+    camera_yaw: float = 0.0
+
+
+def scenario_to_json(scenario: Scenario) -> str:
+    """A scenario as JSON; an infinite time limit becomes null."""
+    values = asdict(scenario)
+    values["time_limit"] = None if math.isinf(scenario.time_limit) else scenario.time_limit
+    return json.dumps(values)
+
+
+def scenario_from_json(text: str) -> Scenario:
+    """The inverse of `scenario_to_json`."""
+    values: dict[str, Any] = json.loads(text)
+    values["start"], values["goal"] = Pose(**values["start"]), Pose(**values["goal"])
+    values["time_limit"] = math.inf if values["time_limit"] is None else values["time_limit"]
+    return Scenario(**values)
+
+
+def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
+    labels = asdict(frame.affordances) | {"speed_sign": frame.affordances.speed_sign or 0}
+    driven = {f"driven_{name}": value for name, value in asdict(frame.driven).items()}
+    clean = {f"clean_{name}": value for name, value in asdict(frame.clean).items()}
+    plain = {name: getattr(frame, name) for name in ("camera", "camera_left", "camera_yaw", "time", "speed")}
+    # 4:4:4 keeps the colour of lamps that are a pixel or two wide.
+    jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
+    named = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
+    return named | plain | labels | driven | clean
+
+
+class EpisodeWriter:
+    """Gathers frames and writes the file whole on `close`; as a context manager it discards them on an error.
+
+    Frames of one moment may come camera by camera. An existing file of that name is replaced.
+    """
+
+    def __init__(self, path: Path | str, scenario: Scenario, id: str = "", quality: int = JPEG_QUALITY) -> None:
+        self.path = Path(path)
+        self.scenario = scenario
+        self.id = id or self.path.stem
+        self.quality = quality
+        self._rows: list[dict[str, Any]] = []
+
+    def append(self, frame: Frame) -> None:
+        self._rows.append(_row(self.id, frame, self.quality))
+
+    def close(self) -> None:
+        """Write the file. Raises EpisodeError where no frame was appended."""
+        if not self._rows:
+            raise EpisodeError(f"{self.path} would be an episode without frames: append at least one before closing it")
+        header = {"version": FORMAT_VERSION, "id": self.id, "scenario": scenario_to_json(self.scenario)}
+        schema = SCHEMA.with_metadata({METADATA_KEY: json.dumps(header).encode()})
+        columns = [name for name in SCHEMA.names if name != "image"]
+        buffer = io.BytesIO()
+        pq.write_table(
+            pa.Table.from_pylist(self._rows, schema=schema),
+            buffer,
+            use_dictionary=["episode", "command"],
+            compression=dict.fromkeys(columns, "zstd") | {"image": "none"},
+        )
+        write_whole(self.path, buffer.getvalue())
+        self._rows = []
+
+    def __enter__(self) -> EpisodeWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if kind is None:
+            self.close()
+        self._rows = []
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it appears whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_bytes(content)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A recording in memory: columns (N,) by name, images still as JPEG.
+
+    columns: episode, frame, camera, camera_left, camera_yaw, time, speed, command (the values of `Command`), the six
+    labels (speed_sign is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera, then by
+    frame.
+    """
+
+    path: Path
+    id: str
+    scenario: Scenario
+    columns: dict[str, NDArray[Any]]
+    jpegs: list[bytes]
+
+    def __len__(self) -> int:
+        return len(self.jpegs)
+
+    def image(self, i: int) -> Image:
+        """Row i's image (H, W, 3), RGB. Raises EpisodeError where its bytes are damaged."""
+        try:
+            return np.asarray(simplejpeg.decode_jpeg(self.jpegs[i], colorspace="RGB"))
+        except ValueError as error:
+            raise EpisodeError(f"row {i} of {self.path} holds a damaged image: record the episode again") from error
+
+    def affordances(self, i: int) -> Affordances:
+        """Row i's labels."""
+        values = {name: self.columns[name][i].item() for name in LABELS}
+        return Affordances(**(values | {"speed_sign": values["speed_sign"] or None}))
+
+    def __getitem__(self, i: int) -> Frame:
+        """Row i with its image decoded."""
+        if not -len(self) <= i < len(self):
+            raise IndexError(f"row {i} of {self.path} was asked for, but it has {len(self)}")
+        value = {name: column[i].item() for name, column in self.columns.items() if column.dtype != object}
+        driven, clean = (Control(*(value[f"{kind}_{name}"] for name in CONTROLS)) for kind in ("driven", "clean"))
+        return Frame(
+            value["frame"],
+            value["time"],
+            value["speed"],
+            Command(self.columns["command"][i]),
+            self.affordances(i),
+            driven,
+            clean,
+            self.image(i),
+            value["camera"],
+            value["camera_left"],
+            value["camera_yaw"],
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[i] for i in range(len(self)))
+
+
+def _header(path: Path, schema: pa.Schema) -> dict[str, Any]:
+    metadata = schema.metadata or {}
+    if METADATA_KEY not in metadata:
+        raise EpisodeError(f"{path} is a Parquet file, but no episode of caldrive: record one with `caldrive collect`")
+    header: dict[str, Any] = json.loads(metadata[METADATA_KEY])
+    if header["version"] != FORMAT_VERSION:
+        found = header["version"]
+        raise EpisodeError(f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: record the episode again")
+    missing = [name for name in SCHEMA.names if name not in schema.names]
+    if missing:
+        raise EpisodeError(f"{path} lacks the column {missing[0]}: record the episode again")
+    return header
+
+
+def read_episode(path: Path | str) -> Episode:
+    """Read a recording. Raises EpisodeError where the file is missing, damaged or of another kind."""
+    path = Path(path)
+    if not path.is_file():
+        raise EpisodeError(f"there is no episode {path}: look for the name, or record one with `caldrive collect`")
+    try:
+        table = pq.read_table(path, memory_map=False, partitioning=None)
+        header = _header(path, table.schema)
+        scenario = scenario_from_json(header["scenario"])
+    except EpisodeError:
+        raise
+    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+        raise EpisodeError(f"{path} is damaged or no Parquet file ({type(error).__name__}): record it again") from error
+    table = table.sort_by([("camera", "ascending"), ("frame", "ascending")])
+    columns = {name: table[name].to_numpy() for name in SCHEMA.names if name != "image"}
+    return Episode(path, header["id"], scenario, columns, table["image"].to_pylist())

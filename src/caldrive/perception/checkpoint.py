@@ -1,0 +1,107 @@
+"""A trained network on disk: one safetensors file, with all that belongs to it as JSON in its header. Nothing is
+unpickled."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from caldrive.config import BlockConfig, PerceptionConfig
+from caldrive.episodes import write_whole
+from caldrive.perception.network import Network
+from caldrive.perception.specs import describe
+
+FORMAT_VERSION = 1
+KEY = "caldrive"
+
+
+class CheckpointError(ValueError):
+    """A checkpoint cannot be used; the message says why."""
+
+
+@dataclass(frozen=True)
+class CheckpointInfo:
+    """What is known of a trained network: its configuration, its data, its validation metrics, and how it was
+    trained."""
+
+    config: PerceptionConfig
+    data: dict[str, Any] = field(default_factory=dict)
+    metrics: dict[str, float] = field(default_factory=dict)
+    training: dict[str, Any] = field(default_factory=dict)
+    seed: int = 0
+
+
+def config_from_dict(values: dict[str, Any]) -> PerceptionConfig:
+    """The inverse of `dataclasses.asdict`."""
+    nested: dict[str, Any] = {k: BlockConfig(**v) if isinstance(v, dict) else v for k, v in values.items()}
+    return PerceptionConfig(**nested)
+
+
+def write_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any]) -> None:
+    """Write tensors and a JSON header, whole or not at all."""
+    contiguous = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    write_whole(path, save(contiguous, metadata={KEY: json.dumps({"version": FORMAT_VERSION} | header)}))
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Tensors and header of a file by `write_tensors`. Raises CheckpointError where it is missing, damaged or
+    foreign."""
+    if not path.is_file():
+        raise CheckpointError(f"there is no checkpoint {path}: look for the name, or make one with `caldrive train`")
+    content = path.read_bytes()
+    try:
+        tensors = load(content)
+        size = struct.unpack("<Q", content[:8])[0]
+        metadata = json.loads(content[8 : 8 + size]).get("__metadata__", {})
+    except (SafetensorError, ValueError, struct.error) as error:
+        raise CheckpointError(f"{path} is damaged or no safetensors file: copy it again or train anew") from error
+    if KEY not in metadata:
+        raise CheckpointError(f"{path} holds tensors, but no network of caldrive: give a file made by `caldrive train`")
+    header: dict[str, Any] = json.loads(metadata[KEY])
+    if header["version"] != FORMAT_VERSION:
+        found = header["version"]
+        raise CheckpointError(
+            f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: train the network anew"
+        )
+    return tensors, header
+
+
+def save_network(path: Path | str, network: Network, info: CheckpointInfo, half: bool = False) -> None:
+    """Write a network; `half` stores weights, though not batch norm's statistics, in 16 bits."""
+    state = network.state_dict()
+    if half:
+        state = {k: v.half() if v.is_floating_point() and v.dim() > 1 else v for k, v in state.items()}
+    write_tensors(Path(path), state, {"kind": "network", "specs": describe()} | asdict(info))
+
+
+def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
+    """Read a network, ready for evaluation, and what is known of it. Raises CheckpointError where it does not fit this
+    code."""
+    path = Path(path)
+    tensors, header = read_tensors(path)
+    if header.get("kind") != "network":
+        raise CheckpointError(
+            f"{path} is a training state, not a finished network: give the model.safetensors beside it"
+        )
+    if header["specs"] != json.loads(json.dumps(describe())):
+        raise CheckpointError(
+            f"{path} was trained for other affordances than this caldrive's six: train the network anew"
+        )
+    try:
+        config = config_from_dict(header["config"])
+        network = Network(config)
+        network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise CheckpointError(
+            f"the weights in {path} do not fit its own configuration: train the network anew"
+        ) from error
+    info = CheckpointInfo(config, header["data"], header["metrics"], header["training"], header["seed"])
+    return network.eval(), info

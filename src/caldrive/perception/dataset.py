@@ -1,0 +1,190 @@
+"""Recorded episodes as batches of short windows of consecutive frames.
+
+A window belongs to one camera of one episode: `context` frames of history, then `window` frames that give a loss. A
+batch lists each frame once and says where the windows find it, so no frame passes the backbone twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from caldrive.datatypes import Command
+from caldrive.episodes import LABELS, Episode, EpisodeError, read_episode
+from caldrive.perception.specs import SPECS, encode_columns
+
+Ids = NDArray[np.int64]
+COMMAND_NUMBERS = {command.value: number for number, command in enumerate(Command)}
+
+
+@dataclass(frozen=True)
+class Batch:
+    """images (N, H, W, 3) in bytes, each frame once; index (B, T): where the windows find their frames among them;
+    group (N,): number of the first window that holds a frame; command (B, S); targets: (B * S,) by affordance."""
+
+    images: NDArray[np.uint8]
+    index: Tensor
+    group: Tensor
+    command: Tensor
+    targets: dict[str, Tensor]
+
+
+def find_episodes(folder: Path | str) -> list[Episode]:
+    """All episodes of a folder by name. Raises EpisodeError where there is none."""
+    paths = sorted(Path(folder).glob("**/*.parquet"))
+    if not paths:
+        raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
+    return [read_episode(path) for path in paths]
+
+
+def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
+    """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for
+    each."""
+    if len(episodes) < 2:
+        raise EpisodeError(f"found {len(episodes)} episode, training and validation need one each: record more")
+    order = np.random.default_rng(seed).permutation(len(episodes))
+    n_held = min(max(1, round(share * len(episodes))), len(episodes) - 1)
+    held = set(order[:n_held].tolist())
+    return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
+
+
+class Frames:
+    """The frames of some episodes, one after the other: labels, commands, images, and where each frame's stream begins.
+
+    A stream is what one camera saw of one episode without a gap. size: (height, width) of the images; images stay
+    decoded in memory where they take at most cache_gb. Raises EpisodeError where an image has another size.
+    """
+
+    def __init__(self, episodes: Sequence[Episode], size: tuple[int, int], cache_gb: float = 0.0) -> None:
+        self.size = size
+        self.labels = {name: np.concatenate([e.columns[name] for e in episodes]) for name in LABELS}
+        words = np.concatenate([e.columns["command"] for e in episodes])
+        self.command = np.array([COMMAND_NUMBERS[word] for word in words], dtype=np.int64)
+        self.targets = encode_columns(self.labels)
+        self.stream_start = self._stream_starts(episodes)
+        self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
+        self._pool = ThreadPoolExecutor(2)
+        self._cache: NDArray[np.uint8] | None = None
+        if len(self) * size[0] * size[1] * 3 <= cache_gb * 1e9:
+            self._cache = self.images(np.arange(len(self)))
+
+    def __len__(self) -> int:
+        return len(self._where)
+
+    @staticmethod
+    def _stream_starts(episodes: Sequence[Episode]) -> Ids:
+        """For each frame the number of its stream's first one."""
+        episode = np.repeat(np.arange(len(episodes)), [len(e) for e in episodes])
+        camera, frame = (np.concatenate([e.columns[name] for e in episodes]) for name in ("camera", "frame"))
+        follows = (np.diff(episode) == 0) & (np.diff(camera) == 0) & (np.diff(frame) == 1)
+        first = np.concatenate(([True], ~follows))
+        return np.maximum.accumulate(np.where(first, np.arange(len(first)), 0))
+
+    def _decode(self, i: int) -> NDArray[np.uint8]:
+        episode, row = self._where[i]
+        image = episode.image(row)
+        if image.shape[:2] != self.size:
+            found, wanted = (f"{w} x {h}" for h, w in (image.shape[:2], self.size))
+            raise EpisodeError(f"{episode.path} has images of {found}, the network takes {wanted}: record at that size")
+        return image
+
+    def images(self, ids: Ids) -> NDArray[np.uint8]:
+        """Images (N, H, W, 3) of frames by number."""
+        if self._cache is not None:
+            return self._cache[ids]
+        images = np.empty((len(ids), *self.size, 3), np.uint8)
+        for slot, image in zip(images, self._pool.map(self._decode, ids.tolist()), strict=True):
+            slot[:] = image
+        return images
+
+    def batch(self, starts: Ids, window: int, context: int) -> Batch:
+        """The windows whose first frames with a loss are `starts`; all of them must lie `window` frames before their
+        stream's end.
+
+        Before a stream's first frame, history is that frame again.
+        """
+        ids = starts[:, None] + np.arange(-context, window)
+        ids = np.maximum(ids, self.stream_start[starts][:, None])  # (B, T)
+        unique, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
+        trained = ids[:, context:]  # (B, S)
+        return Batch(
+            images=self.images(unique),
+            index=torch.from_numpy(inverse.reshape(ids.shape)),
+            group=torch.from_numpy(first // ids.shape[1]),
+            command=torch.from_numpy(self.command[trained]),
+            targets={name: target[trained.ravel()] for name, target in self.targets.items()},
+        )
+
+    def starts(self, window: int) -> Ids:
+        """All frames that begin a window."""
+        last = np.arange(len(self)) + window - 1
+        inside = last < len(self)
+        inside[inside] &= self.stream_start[last[inside]] == self.stream_start[: len(self)][inside]
+        return np.flatnonzero(inside)
+
+    def rarity(self, balance: float) -> NDArray[np.float64]:
+        """For each frame (N,): (1 / frequency) ** balance of the rarest of its classes and its command."""
+        numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self.command]
+        frequencies = [(np.bincount(number) / len(self))[number] for number in numbers]
+        rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
+        return (1 / rarest) ** balance
+
+
+class Sampler:
+    """Draws training windows: the rarer the rarest class or command in it, the likelier a window.
+
+    Hazards, red lights and signs fill a few percent of a drive; drawn evenly, most batches would hold none. What step k
+    draws depends on (seed, k) only, so a run can be taken up anywhere.
+    """
+
+    def __init__(self, frames: Frames, window: int, balance: float, seed: int) -> None:
+        self.frames, self.window, self.seed = frames, window, seed
+        self.starts = frames.starts(window)
+        if not len(self.starts):
+            raise EpisodeError(
+                f"no stream of frames is {window} long: record longer episodes or make the window shorter"
+            )
+        rarity = frames.rarity(balance)
+        weight = np.max([rarity[self.starts + i] for i in range(window)], axis=0)
+        self.probability = weight / weight.sum()
+        self._cumulative = np.cumsum(self.probability)
+
+    def draw(self, step: int, n: int) -> Ids:
+        """First frames of n windows."""
+        chance = np.random.default_rng((self.seed, step)).random(n) * self._cumulative[-1]
+        chosen: Ids = self.starts[np.searchsorted(self._cumulative, chance, side="right")]
+        return chosen
+
+    def class_counts(self) -> dict[str, NDArray[np.float64]]:
+        """How many samples of each class the drawn windows hold, by affordance, in expectation and scaled to the data's
+        size."""
+        share = np.zeros(len(self.frames))
+        for i in range(self.window):
+            np.add.at(share, self.starts + i, self.probability / self.window)
+        return {
+            s.name: np.bincount(self.frames.targets[s.name].numpy(), share * len(self.frames), s.outputs).astype(float)
+            for s in SPECS
+            if s.discrete
+        }
+
+
+def every_window(frames: Frames, window: int, batch: int) -> Iterator[Ids]:
+    """First frames of windows that cover every stream evenly, without overlap, in batches; a rest shorter than one is
+    left out."""
+    starts = frames.starts(window)
+    aligned = starts[(starts - frames.stream_start[starts]) % window == 0]
+    yield from (aligned[i : i + batch] for i in range(0, len(aligned), batch))
+
+
+def summary(train: Frames, held: Frames) -> dict[str, Any]:
+    """What a checkpoint remembers of its data."""
+    counts = {s.name: np.bincount(train.targets[s.name], minlength=s.outputs).tolist() for s in SPECS if s.discrete}
+    return {"train_frames": len(train), "validation_frames": len(held), "train_classes": counts}

@@ -1,0 +1,57 @@
+"""A network's figures on recorded frames, and the precision in which it computes them."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from caldrive.perception.dataset import Batch, Frames, every_window
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network import Network
+from caldrive.perception.specs import losses, metrics
+
+WINDOW = 16  # frames that are evaluated together
+
+
+def use_bf16(precision: str, device: str) -> bool:
+    """Whether to compute in bfloat16; `auto` does where the processor has it, elsewhere it is slower than fp32."""
+    if precision not in ("auto", "fp32", "bf16"):
+        raise ValueError(f"precision is {precision!r}, but must be auto, fp32 or bf16")
+    if precision != "auto":
+        return precision == "bf16"
+    return device != "cpu" or bool(torch.cpu._is_avx512_bf16_supported())
+
+
+def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
+    """The context in which the network computes."""
+    return torch.autocast(device, torch.bfloat16) if use_bf16(precision, device) else nullcontext()
+
+
+def outputs_of(network: Network, batch: Batch, images: Tensor, device: str) -> dict[str, Tensor]:
+    """Normalised images (N, 3, H, W) of a batch to outputs (B * S, K): each frame passes the backbone once."""
+    features = network.features(images.to(device))  # (N, F)
+    windows = features[batch.index.to(device)]  # (B, T, F)
+    outputs: dict[str, Tensor] = network(windows, batch.command.to(device))
+    return outputs
+
+
+@torch.no_grad()
+def evaluate(network: Network, frames: Frames, precision: str = "auto", device: str = "cpu") -> dict[str, float]:
+    """Metrics over all frames, and each affordance's unweighted loss as `<name>/loss`, their sum as `loss`."""
+    network.eval()
+    window = min(WINDOW, len(frames))
+    while not len(frames.starts(window)):
+        window //= 2
+    outputs, targets = [], []
+    for starts in every_window(frames, window, batch=8):
+        batch = frames.batch(starts, window, network.span - 1)
+        with autocast(precision, device):
+            outputs.append(outputs_of(network, batch, normalise(to_float(batch.images)), device))
+        targets.append(batch.targets)
+    joined = {name: torch.cat([o[name].float().cpu() for o in outputs]) for name in outputs[0]}
+    wanted = {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
+    parts = {f"{name}/loss": float(value) for name, value in losses(joined, wanted).items()}
+    return {"loss": sum(parts.values())} | parts | metrics(joined, wanted)

@@ -1,0 +1,121 @@
+"""The network (section 3.1): one shared backbone, and a task block for each affordance."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from caldrive.config import BlockConfig, PerceptionConfig
+from caldrive.datatypes import Command
+from caldrive.perception.backbone import Backbone
+from caldrive.perception.specs import SPECS, Spec
+
+COMMANDS = tuple(Command)  # a command's number is its place here
+KERNEL = 3  # frames that a temporal convolution sees at once
+
+
+class _SafeBatchNorm(nn.BatchNorm1d):
+    """Batch norm that uses its running statistics where a batch holds one sample only: one value has no deviation."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        if self.training and x.shape[0] == 1:
+            return nn.functional.batch_norm(
+                x, self.running_mean, self.running_var, self.weight, self.bias, False, 0.0, self.eps
+            )
+        return super().forward(x)
+
+
+class _Group(nn.Module):
+    """Task layer, batch norm, dropout and output nodes: (N, length, F) to (N, outputs)."""
+
+    def __init__(self, config: BlockConfig, n_features: int, n_outputs: int) -> None:
+        super().__init__()
+        self.kind = config.layer
+        steps = 1
+        self.layer: nn.Module
+        if config.layer == "dense":
+            self.layer = nn.Linear(n_features * config.length, config.nodes)
+        elif config.layer == "tconv":
+            kernel = min(KERNEL, config.length)
+            steps = config.length - kernel + 1
+            self.layer = nn.Conv1d(n_features, config.nodes, kernel)
+        elif config.layer in ("gru", "lstm"):
+            self.layer = {"gru": nn.GRU, "lstm": nn.LSTM}[config.layer](n_features, config.nodes, batch_first=True)
+        else:
+            raise ValueError(f"a task block's layer is {config.layer!r}, but must be dense, lstm, gru or tconv")
+        self.norm = _SafeBatchNorm(config.nodes)
+        self.dropout = nn.Dropout(config.dropout)
+        self.output = nn.Linear(config.nodes * steps, n_outputs)
+
+    def forward(self, sequence: Tensor) -> Tensor:
+        if self.kind in ("gru", "lstm"):
+            hidden = self.norm(self.layer(sequence)[0][:, -1])  # (N, nodes)
+        elif self.kind == "tconv":
+            hidden = self.norm(self.layer(sequence.transpose(1, 2))).relu()  # (N, nodes, steps)
+        else:
+            hidden = self.norm(self.layer(sequence.flatten(1))).relu()  # (N, nodes)
+        result: Tensor = self.output(self.dropout(hidden).flatten(1))
+        return result
+
+
+class TaskBlock(nn.Module):
+    """One affordance from the features. A conditional block has three groups of nodes, one for each command; a sample
+    passes the group of its command only, and so only that one receives its gradient."""
+
+    def __init__(self, config: BlockConfig, spec: Spec, n_features: int) -> None:
+        super().__init__()
+        self.config = config
+        self.n_outputs = spec.outputs
+        n_groups = len(COMMANDS) if spec.conditional else 1
+        self.groups = nn.ModuleList(_Group(config, n_features, spec.outputs) for _ in range(n_groups))
+
+    def forward(self, features: Tensor, command: Tensor) -> Tensor:
+        """Features (B, T, F) and the commands (B, S) of the last S frames to outputs (B * S, outputs)."""
+        T, S = features.shape[1], command.shape[1]
+        back = torch.arange(self.config.length - 1, -1, -1, device=features.device) * self.config.dilation
+        now = torch.arange(T - S, T, device=features.device)
+        # Before the first frame there is the first frame again: the same rule in training and when driving.
+        sequence = features[:, (now[:, None] - back).clamp(min=0)].flatten(0, 1)  # (B * S, length, F)
+        if len(self.groups) == 1:
+            result: Tensor = self.groups[0](sequence)
+            return result
+        command = command.flatten()
+        outputs = sequence.new_zeros(len(sequence), self.n_outputs)
+        for number, group in enumerate(self.groups):
+            active = (command == number).nonzero()[:, 0]
+            if len(active):
+                output = group(sequence[active])
+                outputs = outputs.to(output.dtype).index_copy(0, active, output)
+        return outputs
+
+
+class Network(nn.Module):
+    """The backbone and the six task blocks.
+
+    `features` passes images (N, 3, H, W) through the backbone, `forward` passes features through the task blocks, so
+    that no frame needs the backbone twice.
+    """
+
+    def __init__(self, config: PerceptionConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.backbone = Backbone(config.width, config.batch_norm)
+        n_features = self.backbone.n_features(config.image_height, config.image_width)
+        self.blocks = nn.ModuleDict({s.name: TaskBlock(getattr(config, s.name), s, n_features) for s in SPECS})
+
+    @property
+    def span(self) -> int:
+        """Frames of history that the longest task block looks at, the present one included."""
+        return max(int(getattr(self.config, spec.name).span) for spec in SPECS)
+
+    def features(self, images: Tensor) -> Tensor:
+        """Normalised images (N, 3, H, W) to features (N, F)."""
+        result: Tensor = self.backbone(images)
+        return result
+
+    def forward(self, features: Tensor, command: Tensor) -> dict[str, Tensor]:
+        """Features (B, T, F) and commands (B,) of the last frame, or (B, S) of the last S frames, to outputs (B * S,
+        K)."""
+        if command.dim() == 1:
+            command = command[:, None]
+        return {name: block(features, command) for name, block in self.blocks.items()}

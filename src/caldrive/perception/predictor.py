@@ -1,0 +1,68 @@
+"""The network at the wheel: one image in, six affordances out, each frame through the backbone once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from caldrive.datatypes import Affordances, Image, Observation
+from caldrive.perception.checkpoint import load_network
+from caldrive.perception.evaluation import use_bf16
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network import COMMANDS, Network
+from caldrive.perception.specs import decode
+
+DARK = 3  # no pixel of a working camera's image is as dark as this, even by night
+
+
+class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
+    """An image tells nothing, or the network makes nothing of it; the driver should brake."""
+
+
+class NetworkPerception:
+    """Perception by a trained network: keeps the features of the last `span` frames of an episode.
+
+    Before the first frame there is the first frame again, as in training. precision: auto, fp32 or bf16 for the
+    backbone. threads: how many torch may use, None leaves that as it is. Raises BadImage, and then forgets nothing.
+    """
+
+    def __init__(self, network: Network | Path | str, precision: str = "auto", threads: int | None = None) -> None:
+        if threads is not None:
+            torch.set_num_threads(threads)
+        self.network = network if isinstance(network, Network) else load_network(network)[0]
+        self.network.eval()
+        self._dtype = torch.bfloat16 if use_bf16(precision, "cpu") else torch.float32
+        self.network.backbone.to(self._dtype)
+        self._history: Tensor | None = None  # (1, span, F)
+
+    def reset(self) -> None:
+        """An episode begins: forget the last one's frames."""
+        self._history = None
+
+    @torch.inference_mode()
+    def predict(self, observation: Observation) -> Affordances:
+        """The affordances of the newest frame. Raises BadImage where the image is no use."""
+        self._check(observation.image)
+        image = normalise(to_float(observation.image[None])).to(self._dtype)
+        feature = self.network.features(image).float()[:, None]  # (1, 1, F)
+        if not bool(feature.isfinite().all()):
+            raise BadImage("the image's features are not numbers: brake, and look at the weights")
+        if self._history is None:
+            self._history = feature.expand(-1, self.network.span, -1)
+        else:
+            self._history = torch.cat((self._history[:, 1:], feature), dim=1)
+        command = torch.tensor([COMMANDS.index(observation.command)])
+        return decode(self.network(self._history, command))
+
+    def _check(self, image: Image) -> None:
+        config = self.network.config
+        wanted = (config.image_height, config.image_width, 3)
+        if image.shape != wanted or image.dtype != np.uint8:
+            raise BadImage(
+                f"the image is {image.shape} of {image.dtype}, the network takes {wanted} of uint8: set the camera so"
+            )
+        if image.max() <= DARK:
+            raise BadImage("the image is black: brake, and look at the camera")

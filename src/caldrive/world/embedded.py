@@ -1,0 +1,200 @@
+"""The embedded world: a town with traffic, people, lights and a camera, in one process and without a server."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from caldrive.config import CameraConfig, VehicleConfig
+from caldrive.datatypes import (
+    Affordances,
+    Contact,
+    ContactKind,
+    Control,
+    Image,
+    Observation,
+    Pose,
+    Scenario,
+    Sign,
+    TrafficLight,
+    Truth,
+    VehicleState,
+)
+from caldrive.geometry import moved, to_local, wrap_angle
+from caldrive.world.camera import Camera
+from caldrive.world.contacts import Obstacle, obstacle_of, resolve
+from caldrive.world.labels import label
+from caldrive.world.lights import Lights
+from caldrive.world.pedestrians import Pedestrians
+from caldrive.world.roads import RoadNetwork
+from caldrive.world.route import Route, plan_route
+from caldrive.world.scenery import build_scenery
+from caldrive.world.surface import Surface
+from caldrive.world.towns import load_town
+from caldrive.world.traffic import Traffic, stop_sumo
+from caldrive.world.vehicle import EgoState, advance
+from caldrive.world.weather import weather
+
+DT = 0.1  # s, 10 Hz control (section 4)
+NEAR = 12.0  # m within which solid things are tested for contact
+
+
+class EmbeddedWorld:
+    """Implements `World`. camera: None drives without images (a black pixel stands for them), for agents that need none."""
+
+    dt = DT
+
+    def __init__(self, camera: CameraConfig | None = None, vehicle: VehicleConfig | None = None) -> None:
+        self.mount, self.vehicle = camera, vehicle or VehicleConfig()
+        self._town: str | None = None
+        self._camera: Camera | None = None
+
+    def reset(self, scenario: Scenario) -> Observation:
+        """Starts an episode. Raises ValueError or FileNotFoundError for a scenario that cannot be."""
+        weather(scenario.weather)
+        self._enter(scenario.town)
+        return self.start(scenario, plan_route(self.roads, scenario.start, scenario.goal))
+
+    def start(self, scenario: Scenario, route: Route) -> Observation:
+        """Starts an episode along a given route, in the town entered last."""
+        self.scenario, self.route, self.time = scenario, route, 0.0
+        lights, people, cars = (np.random.default_rng([scenario.seed, i]) for i in range(3))
+        self.ego_state = EgoState(route.line.pose_at(0.0))
+        self.progress = 0.0
+        self.lights = Lights(self.roads, lights)
+        self.vehicles: tuple[VehicleState, ...] = ()
+        self.pedestrians = Pedestrians(self.roads, scenario.n_pedestrians, people, scenario.crossing)
+        self.traffic: Traffic | None = None
+        if scenario.n_vehicles:
+            seed = int(cars.integers(2**31))
+            self.traffic = Traffic(self.roads, scenario.n_vehicles, seed, DT, self.ego, self.lights)
+        self._limits = self._limits_along(route)
+        self._contacts: tuple[Contact, ...] = ()
+        return self._observe()
+
+    def step(self, control: Control) -> Observation:
+        """Moves everything on by dt."""
+        self.ego_state = advance(self.ego_state, control, DT, self.vehicle)
+        self.time = round(self.time + DT, 6)
+        self.lights.step(self.time, (self.ego, *self.vehicles))
+        if self.traffic is not None:
+            self.traffic.step(self.time, self.ego, self.people)
+        self.pedestrians.step(DT, [self.ego, *self.vehicles])
+        self._touch()
+        hit = self.route.line.project(self.ego.pose.x, self.ego.pose.y, near=self.progress)
+        self.progress = hit.s
+        return self._observe()
+
+    def truth(self) -> Truth:
+        """What really is, now."""
+        return self._truth
+
+    def close(self) -> None:
+        """Ends the simulation and frees the camera."""
+        stop_sumo()
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+    @property
+    def ego(self) -> VehicleState:
+        return VehicleState(self.ego_state.pose, self.ego_state.speed, self.vehicle.length, self.vehicle.width, "ego")
+
+    def enter(self, town: str) -> RoadNetwork:
+        """Loads a town without starting an episode."""
+        self._enter(town)
+        return self.roads
+
+    def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
+        """What cameras on the ego see now, (H, W, 3) each."""
+        if self._camera is None:
+            self._camera = Camera(self.roads, self.scenery)
+        states = {light.id: light.state for light in self.signals}
+        return self._camera.render(
+            self.scenario.weather, self.ego, self.vehicles, self.people, states, mounts, self.time
+        )
+
+    def labels_at(self, left: float, yaw: float) -> Affordances:
+        """The affordances of a car that stands `left` m beside the ego, turned by `yaw` (the three-camera set-up)."""
+        ego = self.ego
+        return self._label(replace(ego, pose=moved(ego.pose, left=left, turn=yaw)))
+
+    def _enter(self, town: str) -> None:
+        if town == self._town:
+            return
+        self.roads = load_town(town)
+        self.scenery = build_scenery(self.roads)
+        self.surface = Surface(self.roads)
+        solid = [prop for prop in self.scenery if prop.solid]
+        self._solid = [Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)]
+        self._solid_at = np.array([(o.pose.x, o.pose.y) for o in self._solid]).reshape(-1, 2)
+        self._solid_reach = np.array([np.hypot(o.length, o.width) / 2 for o in self._solid])
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+        self._town = town
+
+    def _touch(self) -> None:
+        """Finds contacts and lets them act on the ego."""
+        x, y = self.ego.pose.x, self.ego.pose.y
+        distance = np.hypot(self._solid_at[:, 0] - x, self._solid_at[:, 1] - y) - self._solid_reach
+        near = [self._solid[i] for i in np.flatnonzero(distance < 4.0)]
+        near += [obstacle_of(t) for t in (*self.vehicles, *self.people) if abs(t.pose.x - x) + abs(t.pose.y - y) < NEAR]
+        ego, self._contacts = resolve(self.ego, near)
+        self.ego_state = replace(self.ego_state, pose=ego.pose, speed=ego.speed)
+
+    def _limits_along(self, route: Route) -> list[tuple[float, float]]:
+        """Where which limit begins along the route (m, km/h)."""
+        found = [(0.0, self.roads.lanes[route.lanes[0][0]].limit)]
+        for sign in self.roads.signs:
+            hit = route.line.project(sign.pose.x, sign.pose.y)
+            if -7 < hit.left < -1 and abs(wrap_angle(hit.heading - sign.pose.heading)) < 0.5:
+                found.append((hit.s, float(sign.limit)))
+        return sorted(found)
+
+    def _label(self, ego: VehicleState) -> Affordances:
+        here, near = ego.pose, self.progress
+        signs = self._signs_near()
+        lights = [one for one in self.signals if abs(one.pose.x - here.x) + abs(one.pose.y - here.y) < 40]
+        return label(
+            ego, self.vehicle.front_axle, self.route.line, near, self.vehicles, self.people, lights, signs
+        )
+
+    def _signs_near(self) -> list[Sign]:
+        here = self.ego.pose
+        return [s for s in self.roads.signs if abs(s.pose.x - here.x) + abs(s.pose.y - here.y) < 40]
+
+    def _observe(self) -> Observation:
+        self.vehicles = self.traffic.cars if self.traffic is not None else ()
+        self.people = self.pedestrians.states()
+        self.signals: tuple[TrafficLight, ...] = self.lights.shown()
+        self._truth = self._find_truth()
+        image = self.images([self.mount])[0] if self.mount is not None else np.zeros((1, 1, 3), np.uint8)
+        return Observation(self.time, image, self.ego.speed, self.route.command_at(self.progress))
+
+    def _find_truth(self) -> Truth:
+        ego, goal = self.ego, self.scenario.goal
+        travel = self.route.line.heading_at(self.progress)
+        opposite, sidewalk = self.surface.shares(ego, travel)
+        return Truth(
+            time=self.time,
+            ego=ego,
+            affordances=self._label(ego),
+            vehicles=self.vehicles,
+            pedestrians=self.people,
+            lights=self.signals,
+            contacts=self._contacts,
+            opposite_share=opposite,
+            sidewalk_share=sidewalk,
+            route_done=min(self.progress, self.route.length),
+            route_length=self.route.length,
+            goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
+            speed_limit=[limit for s, limit in self._limits if s <= self.progress + 0.1][-1],
+        )
+
+
+def lane_pose(roads: RoadNetwork, lane: str, s: float) -> Pose:
+    """The pose on a lane's centre line at s metres."""
+    return roads.lanes[lane].line.pose_at(s)

@@ -1,0 +1,180 @@
+"""The other cars: SUMO in process. It knows the ego as one of its vehicles and is told the state of the lights.
+
+SUMO's conventions end here: its positions are those of front bumpers, its angles run clockwise from north in degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import libsumo
+import numpy as np
+
+from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, VehicleState
+from caldrive.geometry import moved, wrap_angle
+from caldrive.world.lights import Lights
+from caldrive.world.roads import Lane, RoadNetwork
+
+EGO = "ego"
+SPACING = 12.0  # m of lane that a car takes at the start
+CLEAR_OF_EGO = 18.0  # m
+LONGEST_WAIT = 75.0  # s until a car that is stuck is moved elsewhere
+OUT_OF_SIGHT = 70.0  # m from the ego
+PEOPLE_AHEAD, COMFORTABLE_BRAKE = 30.0, 4.0  # m, m/s²
+MODELS = (("compact", 4.2, 1.76), ("estate", 4.6, 1.8), ("van", 4.9, 1.95))  # name, length, width in m
+_LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
+
+
+class Traffic:
+    """One SUMO simulation; there can be one in a process. Raises ValueError for more cars than the town holds.
+
+    cars: all but the ego, as of the last step.
+    """
+
+    def __init__(self, roads: RoadNetwork, n: int, seed: int, dt: float, ego: VehicleState, lights: Lights) -> None:
+        self.roads, self.rng, self.dt, self.lights = roads, np.random.default_rng(seed), dt, lights
+        arguments = [
+            "-n", str(roads.network), "--step-length", str(dt), "--seed", str(seed % 2**31), "--no-step-log",
+            "--no-warnings", "--time-to-teleport", "-1", "--collision.action", "none", "--start",
+            "--default.speeddev", "0.05",
+        ]  # fmt: skip
+        if libsumo.isLoaded():
+            libsumo.load(arguments)
+        else:
+            libsumo.start(["sumo", *arguments])
+        for name, length, width in MODELS:
+            libsumo.vehicletype.copy("DEFAULT_VEHTYPE", name)
+            libsumo.vehicletype.setLength(name, length)
+            libsumo.vehicletype.setWidth(name, width)
+            libsumo.vehicletype.setEmergencyDecel(name, 9.0)
+            libsumo.vehicletype.setImperfection(name, 0.2)
+        self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
+        self._add_ego(ego)
+        for name, (lane, s) in zip(self.size, self._places(n, ego), strict=True):
+            self._add(name, lane, s)
+        self._shown: dict[str, str] = {}
+        self._held: set[str] = set()
+        self._open_unposted_lights()
+        self._show_lights()
+        libsumo.simulationStep()
+        self.cars = self._read()
+
+    def _places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
+        """Random free places for n cars, away from the ego."""
+        free = []
+        for lane in self.roads.driveable:
+            for s in np.arange(SPACING, lane.line.length - 2.0, SPACING):
+                here = lane.line.pose_at(float(s))
+                if math.hypot(here.x - ego.pose.x, here.y - ego.pose.y) > CLEAR_OF_EGO:
+                    free.append((lane, float(s)))
+        if n > len(free):
+            raise ValueError(f"found {n} cars asked for, but {self.roads.name} has room for {len(free)}: ask for fewer with --cars")
+        return [free[int(i)] for i in self.rng.permutation(len(free))[:n]]
+
+    def _walk(self, edge: str, steps: int = 30) -> list[str]:
+        """A random way through the town, by edges."""
+        edges, lane = [edge], next(one for one in self.roads.driveable if _edge(one.id) == edge)
+        while len(edges) < steps and lane.successors:
+            lane = self.roads.lanes[lane.successors[int(self.rng.integers(len(lane.successors)))]]
+            if not lane.internal:
+                edges.append(_edge(lane.id))
+        return edges
+
+    def _add(self, name: str, lane: Lane, s: float) -> None:
+        edges = self._walk(_edge(lane.id))
+        route = f"{name}@{libsumo.simulation.getTime():.1f}"
+        libsumo.route.add(route, edges)
+        model, index = self.size[name][0], lane.id.rsplit("_", 1)[1]
+        libsumo.vehicle.add(name, route, typeID=model, departPos=f"{s:.2f}", departLane=index, departSpeed="0")
+
+    def _add_ego(self, ego: VehicleState) -> None:
+        lane, s = self.roads.lane_at(ego.pose)
+        libsumo.route.add("ego", [_edge(lane.id)])
+        libsumo.vehicle.add(EGO, "ego", departPos=f"{min(s + ego.length / 2, lane.line.length):.2f}", departSpeed="0")
+        libsumo.vehicle.setLength(EGO, ego.length)
+        libsumo.vehicle.setWidth(EGO, ego.width)
+
+    def _show_lights(self) -> None:
+        """Tells SUMO what the lights show; links without a post stay green."""
+        for name, junction in self.lights.junctions.items():
+            if name not in self._shown:
+                self._shown[name] = "G" * len(libsumo.trafficlight.getControlledLinks(name))
+            row = list(self._shown[name])
+            for post, state in zip(junction.posts, junction.states(), strict=True):
+                for link in post.links:
+                    row[link] = _LETTER[state]
+            text = "".join(row)
+            if self._shown[name] != text:
+                libsumo.trafficlight.setRedYellowGreenState(name, text)
+                self._shown[name] = text
+
+    def _open_unposted_lights(self) -> None:
+        """A map may name lights where no post stands: nobody would know to wait there."""
+        for name in libsumo.trafficlight.getIDList():
+            links = len(libsumo.trafficlight.getControlledLinks(name))
+            libsumo.trafficlight.setRedYellowGreenState(name, "G" * links)
+
+    def step(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
+        """Moves the cars on by dt, under what the lights show now; time in s."""
+        self._show_lights()
+        front = moved(ego.pose, forward=ego.length / 2)
+        angle = 90.0 - math.degrees(ego.pose.heading)
+        libsumo.vehicle.moveToXY(EGO, "", -1, front.x, front.y, angle, keepRoute=2)
+        self._brake_for(people)
+        libsumo.simulationStep()
+        self.cars = self._read()
+        if round(time / self.dt) % 20 == 0:
+            self._look_after(ego)
+
+    def _brake_for(self, people: Sequence[PedestrianState]) -> None:
+        """SUMO's cars do not see our people: cap their speed so that they stop before anybody on the road."""
+        if not people and not self._held:
+            return
+        walkers = np.array([(p.pose.x, p.pose.y) for p in people if p.on_road]).reshape(-1, 2)
+        for car in self.cars:
+            c, s = math.cos(car.pose.heading), math.sin(car.pose.heading)
+            d = walkers - (car.pose.x, car.pose.y)
+            ahead, left = d @ (c, s) - car.length / 2, d @ (-s, c)
+            near = ahead[(np.abs(left) < 2.3) & (ahead > -car.length) & (ahead < PEOPLE_AHEAD)]
+            allowed = math.sqrt(2 * COMFORTABLE_BRAKE * max(float(near.min()) - 2.5, 0.0)) if len(near) else -1.0
+            held = 0 <= allowed < car.speed + 1.0
+            if held or car.id in self._held:
+                libsumo.vehicle.setSpeed(car.id, allowed if held else -1.0)
+            (self._held.add if held else self._held.discard)(car.id)
+
+    def _look_after(self, ego: VehicleState) -> None:
+        """Gives cars near the end of their way a new one, and moves those that are stuck while nobody sees it."""
+        present = set(libsumo.vehicle.getIDList())
+        for name in self.size:
+            if name not in present:
+                if name not in libsumo.simulation.getPendingVehicles():
+                    self._add(name, *self._places(1, ego)[0])
+                continue
+            way, index = libsumo.vehicle.getRoute(name), libsumo.vehicle.getRouteIndex(name)
+            if 0 <= index and len(way) - index < 6 and libsumo.vehicle.getRoadID(name) == way[index]:
+                libsumo.vehicle.setRoute(name, self._walk(way[index]))
+            x, y = libsumo.vehicle.getPosition(name)
+            seen = math.hypot(x - ego.pose.x, y - ego.pose.y) < OUT_OF_SIGHT
+            if libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT and not seen:
+                libsumo.vehicle.remove(name)
+
+    def _state(self, name: str) -> VehicleState:
+        _, length, width = self.size[name]
+        x, y = libsumo.vehicle.getPosition(name)
+        heading = wrap_angle(math.radians(90.0 - libsumo.vehicle.getAngle(name)))
+        center = moved(Pose(x, y, heading), forward=-length / 2)
+        return VehicleState(center, libsumo.vehicle.getSpeed(name), length, width, name)
+
+    def _read(self) -> tuple[VehicleState, ...]:
+        return tuple(self._state(name) for name in libsumo.vehicle.getIDList() if name != EGO)
+
+
+def _edge(lane: str) -> str:
+    return lane.rsplit("_", 1)[0]
+
+
+def stop_sumo() -> None:
+    """Ends the simulation of this process, if there is one."""
+    if libsumo.isLoaded():
+        libsumo.close()
