@@ -104,7 +104,7 @@ def limits(length: float, bends: list[tuple[float, float]]) -> list[tuple[float,
 
 
 def _limit_at(profile: list[tuple[float, int]], s: float) -> int:
-    return [limit for start, limit in profile if start <= s + 1e-6][-1]
+    return [limit for start, limit in profile if start <= s + 0.02][-1]
 
 
 def _cut(line: Points, start: float, end: float) -> Points:
