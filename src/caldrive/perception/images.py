@@ -108,11 +108,10 @@ def _salt_and_pepper(images: Tensor, groups: Tensor, config: Augmentation, gener
 def augment(
     images: Tensor, generator: Generator, groups: Tensor | None = None, config: Augmentation | None = None
 ) -> Tensor:
-    """Change colour, contrast, brightness and sharpness and add salt and pepper, in place; images (N, 3, H, W) in [0,
-    1] on the CPU.
+    """Change colour, contrast, brightness and sharpness and add salt and pepper, in place.
 
-    groups (N,): frames of one number (from 0) change alike, so that a sequence does not flicker; default: each by
-    itself.
+    images (N, 3, H, W): as from `to_float`, in [0, 1] and on the CPU.
+    groups (N,): frames of one number (from 0) change alike, so that no sequence flickers; default: each by itself.
     """
     config = config or Augmentation()
     groups = torch.arange(len(images)) if groups is None else groups

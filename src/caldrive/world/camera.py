@@ -67,7 +67,7 @@ class Camera:
         data = self.context.buffer(np.ascontiguousarray(mesh.vertices).tobytes())
         index = self.context.buffer(mesh.triangles.astype("u4").tobytes())
         return self.context.vertex_array(
-            self._program, [(data, "3f 12x 4ni1 4f1", "position", "normal", "color")], index_buffer=index, index_element_size=4
+            self._program, [(data, "3f 3x4 4f1 4f1", "position", "normal", "color")], index_buffer=index, index_element_size=4
         )
 
     def _target(self, width: int, height: int) -> moderngl.Framebuffer:

@@ -15,7 +15,6 @@ from caldrive.datatypes import (
     Control,
     Image,
     Observation,
-    Pose,
     Scenario,
     Sign,
     TrafficLight,
@@ -172,7 +171,8 @@ class EmbeddedWorld:
         self.signals: tuple[TrafficLight, ...] = self.lights.shown()
         self._truth = self._find_truth()
         image = self.images([self.mount])[0] if self.mount is not None else np.zeros((1, 1, 3), np.uint8)
-        return Observation(self.time, image, self.ego.speed, self.route.command_at(self.progress))
+        self.observation = Observation(self.time, image, self.ego.speed, self.route.command_at(self.progress))
+        return self.observation
 
     def _find_truth(self) -> Truth:
         ego, goal = self.ego, self.scenario.goal
@@ -193,8 +193,3 @@ class EmbeddedWorld:
             goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
             speed_limit=[limit for s, limit in self._limits if s <= self.progress + 0.1][-1],
         )
-
-
-def lane_pose(roads: RoadNetwork, lane: str, s: float) -> Pose:
-    """The pose on a lane's centre line at s metres."""
-    return roads.lanes[lane].line.pose_at(s)

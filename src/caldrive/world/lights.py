@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from caldrive.datatypes import LightState, Points, Pose, TrafficLight, VehicleState
-from caldrive.geometry import to_local
+from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
 from caldrive.world.roads import LightPost, RoadNetwork
 
 SHORTEST_GREEN, LONGEST_GREEN = 4.0, 7.0  # s
@@ -56,28 +56,32 @@ class Junction:
 
     def __init__(self, posts: tuple[LightPost, ...], phase: Phase) -> None:
         self.posts, self.phase = posts, phase
-        stops = np.array([np.mean(post.stop_line, axis=0) for post in posts])
-        self.center: Points = stops.mean(0)
-        self.radius = float(np.linalg.norm(stops - self.center, axis=1).max())
-        self.stops = [replace(post.pose, x=float(x), y=float(y)) for post, (x, y) in zip(posts, stops, strict=True)]
-
-    def step(self, time: float, at: Points, headings: Points) -> None:
-        """Looks at the cars (centres and headings) and moves on to the next phase if it is time."""
-        away = np.hypot(*(at - self.center).T)
-        near = away < self.radius + LOOP + 6.0
-        waiting = [self._waits(stop, at[near], headings[near]) for stop in self.stops]
-        occupied = bool((away < self.radius - 4.0).any())
-        self.phase = next_phase(self.phase, time, waiting, occupied)
-
-    @staticmethod
-    def _waits(stop: Pose, at: Points, headings: Points) -> bool:
-        local = to_local(stop, at)
-        same_way = np.cos(headings - stop.heading) > 0.7
-        return bool(((local[:, 0] > -LOOP - 2.0) & (local[:, 0] < 0.5) & (np.abs(local[:, 1]) < 2.0) & same_way).any())
 
     def states(self) -> list[LightState]:
         """What each post shows."""
         return [self.phase.state if i == self.phase.approach else LightState.RED for i in range(len(self.posts))]
+
+
+class _Detectors:
+    """Loops before all stop lines and inside all junctions, looked at in one go."""
+
+    def __init__(self, junctions: Iterable[Junction]) -> None:
+        groups = [np.array([np.mean(post.stop_line, axis=0) for post in junction.posts]) for junction in junctions]
+        self.stops = np.concatenate(groups)
+        headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
+        self.forward = np.stack((np.cos(headings), np.sin(headings)), axis=-1)
+        self.centers = np.array([stops.mean(0) for stops in groups])
+        self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
+
+    def look(self, poses: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Who waits at which post (in order), and which junctions are occupied; poses: x, y, heading of (N, 3) cars."""
+        d = poses[None, :, :2] - self.stops[:, None]
+        u, v = self.forward[:, None, 0], self.forward[:, None, 1]
+        ahead, left = d[..., 0] * u + d[..., 1] * v, d[..., 1] * u - d[..., 0] * v
+        same_way = np.cos(poses[:, 2]) * u + np.sin(poses[:, 2]) * v > 0.7
+        waiting = ((ahead > -LOOP - 2.0) & (ahead < 0.5) & (np.abs(left) < 2.0) & same_way).any(1)
+        away = np.hypot(*np.moveaxis(poses[None, :, :2] - self.centers[:, None], -1, 0))
+        return waiting, (away < self.radii[:, None] - 4.0).any(1)
 
 
 class Lights:
@@ -91,12 +95,18 @@ class Lights:
             name: Junction(tuple(posts), Phase(int(rng.integers(len(posts))), LightState.GREEN, -float(rng.uniform(0, 4))))
             for name, posts in sorted(grouped.items())
         }
+        self._detectors = _Detectors(self.junctions.values()) if self.junctions else None
 
     def step(self, time: float, cars: Iterable[VehicleState]) -> None:
         """Moves all junctions on to a time (s), given everybody who drives."""
-        poses = np.array([(c.pose.x, c.pose.y, c.pose.heading) for c in cars])
-        for junction in self.junctions.values():
-            junction.step(time, poses[:, :2], poses[:, 2])
+        if self._detectors is None:
+            return
+        waiting, occupied = self._detectors.look(np.array([(c.pose.x, c.pose.y, c.pose.heading) for c in cars]))
+        first = 0
+        for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
+            last = first + len(junction.posts)
+            junction.phase = next_phase(junction.phase, time, waiting[first:last].tolist(), busy)
+            first = last
 
     def shown(self) -> tuple[TrafficLight, ...]:
         """Every light with what it shows."""

@@ -16,7 +16,6 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
-from caldrive.geometry import Polyline
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 
 Floats = NDArray[np.float64]
@@ -36,6 +35,7 @@ class Crossing:
 
     loop: int
     s: float
+    start: Points
     end: Points
     end_loop: int
     end_s: float
@@ -48,7 +48,6 @@ class Walks:
     table: x, y, heading every STRIDE metres of all loops; first: each loop's first row in it.
     """
 
-    loops: tuple[Polyline, ...]
     crossings: tuple[tuple[Crossing, ...], ...]
     lengths: Floats
     table: Floats
@@ -60,33 +59,45 @@ def find_walks(roads: RoadNetwork) -> Walks:
     """The sidewalk loops of a town and every metre of kerb where one can cross."""
     middle = roads.roadway.buffer(SIDEWALK_WIDTH / 2)
     parts = middle.geoms if hasattr(middle, "geoms") else [middle]
-    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
-    loops = tuple(Polyline(np.array(ring.simplify(0.02).coords)) for ring in rings)
-    poses = [[loop.pose_at(s) for s in np.arange(0.0, loop.length + STRIDE, STRIDE)] for loop in loops]
-    first = np.cumsum([0, *(len(rows) for rows in poses[:-1])])
-    table = np.array([(pose.x, pose.y, pose.heading) for rows in poses for pose in rows])
-    crossings = tuple(_crossings(i, loops, middle) for i in range(len(loops)))
-    return Walks(loops, crossings, np.array([loop.length for loop in loops]), table, first)
+    rings = [ring.simplify(0.02) for part in parts for ring in (part.exterior, *part.interiors)]
+    tables = [_table(np.array(ring.coords)) for ring in rings]
+    first = np.cumsum([0, *(len(table) for table in tables[:-1])])
+    shapely.prepare(middle)
+    crossings = tuple(_crossings(i, table, rings, middle) for i, table in enumerate(tables))
+    return Walks(crossings, np.array([ring.length for ring in rings]), np.concatenate(tables), first)
 
 
-def _crossings(i: int, loops: tuple[Polyline, ...], middle: shapely.Geometry) -> tuple[Crossing, ...]:
+def _table(ring: Points) -> Floats:
+    """x, y, heading every STRIDE metres of a closed line."""
+    steps = np.diff(ring, axis=0)
+    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
+    at = np.arange(0.0, s[-1] + STRIDE, STRIDE)
+    turns = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    middles = (s[1:] + s[:-1]) / 2
+    return np.stack([np.interp(at, s, ring[:, 0]), np.interp(at, s, ring[:, 1]), np.interp(at, middles, turns)], axis=1)
+
+
+def _crossings(
+    i: int, table: Floats, rings: list[shapely.LinearRing], middle: shapely.Geometry
+) -> tuple[Crossing, ...]:
     """Straight over the road every 2 m: towards the inside of the road area, up to the next loop."""
-    loop, found = loops[i], []
-    for s in np.arange(1.0, loop.length - 1.0, 2.0):
-        pose = loop.pose_at(s)
-        here = np.array([pose.x, pose.y])
-        sideways = np.array([-math.sin(pose.heading), math.cos(pose.heading)])
-        inwards = sideways if middle.contains(shapely.Point(here + 0.3 * sideways)) else -sideways
-        beam = shapely.LineString([here + 0.3 * inwards, here + WIDEST_CROSSING * inwards])
-        inside = beam.intersection(middle)
-        first = inside.geoms[0] if hasattr(inside, "geoms") else inside
-        if first.length < 5 or first.length > WIDEST_CROSSING - 1:
-            continue
-        end = np.array(first.coords[-1])
-        hits = [loop.project(*end) for loop in loops]
-        j = int(np.argmin([abs(hit.left) for hit in hits]))
-        found.append(Crossing(i, float(s), end, j, hits[j].s))
-    return tuple(found)
+    rows = np.arange(int(1.0 / STRIDE), len(table) - int(1.0 / STRIDE), int(2.0 / STRIDE))
+    here, heading = table[rows, :2], table[rows, 2]
+    sideways = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
+    inwards = np.where(shapely.contains_xy(middle, here + 0.3 * sideways)[:, None], sideways, -sideways)
+    beams = shapely.linestrings(np.stack((here + 0.3 * inwards, here + WIDEST_CROSSING * inwards), axis=1))
+    inside = shapely.intersection(beams, middle)
+    straight = shapely.get_geometry(inside, 0)
+    lengths = shapely.length(straight)
+    good = (lengths > 5) & (lengths < WIDEST_CROSSING - 1)
+    ends = shapely.get_point(straight[good], -1)
+    loop = np.argmin([shapely.distance(ring, ends) for ring in rings], axis=0)
+    s = [rings[k].project(end) for k, end in zip(loop, ends, strict=True)]
+    at = shapely.get_coordinates(ends)
+    return tuple(
+        Crossing(i, float(row * STRIDE), start, end, int(k), float(there))
+        for row, start, end, k, there in zip(rows[good], here[good], at, loop, s, strict=True)
+    )
 
 
 class Pedestrians:
@@ -123,10 +134,10 @@ class Pedestrians:
     def step(self, dt: float, cars: list[VehicleState]) -> None:
         """Everybody walks on for dt seconds."""
         starts = self.rng.random(self.n) < self.rate * dt
-        view = _View(cars)
         crossing = np.array([way is not None for way in self.crossing], dtype=bool)
-        for k in np.flatnonzero(crossing):
-            self._cross(int(k), dt, view)
+        who = np.flatnonzero(crossing)
+        if len(who):
+            self._cross(who, dt, cars)
         walk = np.flatnonzero(~crossing)
         self.s[walk] = (self.s[walk] + self.way[walk] * self.pace[walk] * dt) % self.walks.lengths[self.loop[walk]]
         self.walking[walk] = True
@@ -136,33 +147,29 @@ class Pedestrians:
 
     def _start_crossing(self, k: int) -> None:
         options = self.walks.crossings[self.loop[k]]
-        near = [c for c in options if abs(c.s - self.s[k]) < 1.5]
-        if near:
-            self.crossing[k], self.waited[k] = near[0], 0.0
+        near = next((c for c in options if abs(c.s - self.s[k]) < 1.5), None)
+        if near is not None:
+            self.crossing[k], self.waited[k] = near, 0.0
 
-    def _cross(self, k: int, dt: float, view: _View) -> None:
-        way = self.crossing[k]
-        assert way is not None
-        gap = way.end - self.position[k]
-        rest = float(np.linalg.norm(gap))
-        ahead = gap / max(rest, 1e-9)
-        step = self.pace[k] * dt
-        self.walking[k] = view.may_step(self.position[k], ahead, step + 0.25)
-        self.heading[k] = math.atan2(ahead[1], ahead[0])
-        if rest <= step:
-            self._arrive(k, way)
-        elif self.walking[k]:
-            self.position[k] += ahead * step
-            self.on_road[k] = self.on_road[k] or rest < np.linalg.norm(way.end - self._start_of(way)) - SIDEWALK_WIDTH / 2
-            self.on_road[k] = self.on_road[k] and rest > SIDEWALK_WIDTH / 2
-        elif not self.on_road[k]:
-            self.waited[k] += dt
-            if self.waited[k] > PATIENCE:
+    def _cross(self, who: NDArray[np.int64], dt: float, cars: list[VehicleState]) -> None:
+        """Those who cross go on, wait for a car, arrive, or lose patience at the kerb."""
+        ways = [way for way in (self.crossing[k] for k in who) if way is not None]
+        start, end = np.array([way.start for way in ways]), np.array([way.end for way in ways])
+        gap = end - self.position[who]
+        rest = np.hypot(*gap.T)
+        ahead = gap / np.maximum(rest, 1e-9)[:, None]
+        step = self.pace[who] * dt
+        go = may_step(self.position[who], ahead * (step + 0.25)[:, None], cars)
+        self.walking[who], self.heading[who] = go, np.arctan2(ahead[:, 1], ahead[:, 0])
+        self.position[who] += np.where(go, np.minimum(step, rest), 0.0)[:, None] * ahead
+        done = np.hypot(*(self.position[who] - start).T)
+        self.on_road[who] = np.minimum(done, rest) > SIDEWALK_WIDTH / 2
+        self.waited[who] += np.where(go | self.on_road[who], 0.0, dt)
+        for k, way, arrived in zip(who.tolist(), ways, rest <= step, strict=True):
+            if arrived:
+                self._arrive(k, way)
+            elif self.waited[k] > PATIENCE:
                 self.crossing[k] = None
-
-    def _start_of(self, way: Crossing) -> Points:
-        pose = self.walks.loops[way.loop].pose_at(way.s)
-        return np.array([pose.x, pose.y])
 
     def _arrive(self, k: int, way: Crossing) -> None:
         self.loop[k], self.s[k], self.aside[k], self.crossing[k] = way.end_loop, way.end_s, 0.0, None
@@ -182,29 +189,19 @@ class Pedestrians:
         )
 
 
-class _View:
-    """What a person at the kerb sees of the cars."""
+def may_step(position: Points, step: Points, cars: list[VehicleState]) -> NDArray[np.bool_]:
+    """Who of N people (N, 2) may take a step (N, 2): who thereby enters no corridor of a car that could not stop or pass."""
+    at = np.array([(c.pose.x, c.pose.y) for c in cars])
+    heading, speed, half = np.array([(c.pose.heading, c.speed, c.length / 2) for c in cars]).T
+    u, v = np.cos(heading), np.sin(heading)
 
-    def __init__(self, cars: list[VehicleState]) -> None:
-        self.at = np.array([(c.pose.x, c.pose.y) for c in cars]).reshape(-1, 2)
-        headings = np.array([c.pose.heading for c in cars])
-        self.forward = np.stack((np.cos(headings), np.sin(headings)), axis=-1)
-        self.speed = np.array([c.speed for c in cars])
-        self.half = np.array([c.length / 2 for c in cars])
+    def seen_from_cars(points: Points) -> tuple[Floats, Floats]:
+        d = points[:, None] - at
+        return d[..., 0] * u + d[..., 1] * v - half, np.abs(d[..., 1] * u - d[..., 0] * v)
 
-    def may_step(self, position: Points, direction: Points, reach: float) -> bool:
-        """Whether the next step enters no corridor of a car that could not stop or pass in time."""
-        now, then = self._seen_from_cars(position), self._seen_from_cars(position + direction * reach)
-        entering = (np.abs(now[1]) > CORRIDOR) & (np.abs(then[1]) <= CORRIDOR)
-        ahead = now[0] - self.half  # metres from the front bumper
-        beside = (ahead <= 0.8) & (ahead > -2 * self.half - 1.0)
-        room = np.where(self.speed > STOPPABLE_SPEED, self.speed * 4.5, 3.5 + self.speed * 0.5 + self.speed**2 / 10)
-        coming = (ahead > 0) & (ahead < room) & (self.speed > 0.3)
-        return not bool((entering & (beside | coming)).any())
-
-    def _seen_from_cars(self, point: Points) -> tuple[Floats, Floats]:
-        d = point - self.at
-        return (
-            d[:, 0] * self.forward[:, 0] + d[:, 1] * self.forward[:, 1],
-            d[:, 1] * self.forward[:, 0] - d[:, 0] * self.forward[:, 1],
-        )
+    (ahead, aside), (_, then) = seen_from_cars(position), seen_from_cars(position + step)
+    entering = (aside > CORRIDOR) & (then <= CORRIDOR)
+    beside = (ahead <= 0.8) & (ahead > -2 * half - 1.0)
+    room = np.where(speed > STOPPABLE_SPEED, speed * 4.5, 3.5 + speed * 0.5 + speed**2 / 10)
+    coming = (ahead > 0) & (ahead < room) & (speed > 0.3)
+    return ~(entering & (beside | coming)).any(1)

@@ -14,8 +14,9 @@ in vec3 position; in vec3 uv; in vec4 normal; in vec4 color;
 out vec3 lit; out vec3 sunlit;
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
-    lit = color.rgb * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * normal.z);
-    sunlit = color.rgb * sun.rgb * max(dot(normal.xyz, sun_direction.xyz), 0.0);
+    vec3 n = (normal.xyz * 255.0 - 128.0) / 127.0;
+    lit = color.rgb * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * n.z);
+    sunlit = color.rgb * sun.rgb * max(dot(n, sun_direction.xyz), 0.0);
 }
 """
 

@@ -123,25 +123,29 @@ class Traffic:
         libsumo.vehicle.moveToXY(EGO, "", -1, front.x, front.y, angle, keepRoute=2)
         self._brake_for(people)
         libsumo.simulationStep()
-        self.cars = self._read()
         if round(time / self.dt) % 20 == 0:
             self._look_after(ego)
+        self.cars = self._read()
 
     def _brake_for(self, people: Sequence[PedestrianState]) -> None:
         """SUMO's cars do not see our people: cap their speed so that they stop before anybody on the road."""
         if not people and not self._held:
             return
         walkers = np.array([(p.pose.x, p.pose.y) for p in people if p.on_road]).reshape(-1, 2)
-        for car in self.cars:
-            c, s = math.cos(car.pose.heading), math.sin(car.pose.heading)
-            d = walkers - (car.pose.x, car.pose.y)
-            ahead, left = d @ (c, s) - car.length / 2, d @ (-s, c)
-            near = ahead[(np.abs(left) < 2.3) & (ahead > -car.length) & (ahead < PEOPLE_AHEAD)]
-            allowed = math.sqrt(2 * COMFORTABLE_BRAKE * max(float(near.min()) - 2.5, 0.0)) if len(near) else -1.0
-            held = 0 <= allowed < car.speed + 1.0
-            if held or car.id in self._held:
-                libsumo.vehicle.setSpeed(car.id, allowed if held else -1.0)
-            (self._held.add if held else self._held.discard)(car.id)
+        cars = np.array([(c.pose.x, c.pose.y, c.pose.heading, c.length, c.speed) for c in self.cars]).reshape(-1, 5)
+        d, u, v = walkers[None] - cars[:, None, :2], np.cos(cars[:, 2, None]), np.sin(cars[:, 2, None])
+        ahead = d[..., 0] * u + d[..., 1] * v - cars[:, 3, None] / 2
+        left = d[..., 1] * u - d[..., 0] * v
+        near = (np.abs(left) < 2.3) & (ahead > -cars[:, 3, None]) & (ahead < PEOPLE_AHEAD)
+        gap = np.where(near, np.maximum(ahead - 2.5, 0.0), np.inf).min(axis=1, initial=np.inf)
+        allowed = np.sqrt(2 * COMFORTABLE_BRAKE * gap)
+        held = {self.cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < cars[:, 4] + 1.0)}
+        for name in sorted(self._held - held.keys()):
+            if any(car.id == name for car in self.cars):
+                libsumo.vehicle.setSpeed(name, -1.0)
+        for name, speed in held.items():
+            libsumo.vehicle.setSpeed(name, speed)
+        self._held = set(held)
 
     def _look_after(self, ego: VehicleState) -> None:
         """Gives cars near the end of their way a new one, and moves those that are stuck while nobody sees it."""

@@ -1,0 +1,75 @@
+"""Who drives: an agent by name, in a world with the camera that it needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from caldrive.config import CameraConfig, ControlConfig
+from caldrive.control.controller import Controller
+from caldrive.control.presets import DEFAULT, PAPER
+from caldrive.datatypes import Scenario
+from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.driving.settings import DriverSettings
+from caldrive.driving.tasks import scenarios
+from caldrive.world.embedded import EmbeddedWorld
+
+AGENTS = ("cal", "oracle")
+PRESETS = {"default": DEFAULT, "paper": PAPER}
+SHIPPED_MODEL = Path(__file__).parents[1] / "models" / "cal.safetensors"
+
+
+def model_path(model: Path | None) -> Path:
+    """The model asked for, or the package's. Raises FileNotFoundError where there is none."""
+    if model is None and not SHIPPED_MODEL.is_file():
+        raise FileNotFoundError(
+            "found no trained network in this package, wanted one for the agent cal: "
+            "type --agent oracle, or make one with `caldrive train` and give it with --model FILE"
+        )
+    return model or SHIPPED_MODEL
+
+
+def controller_config(preset: str, cap: float | None) -> ControlConfig:
+    """A preset by name, with a cap in km/h. Raises ValueError for an unknown preset or a cap that is not positive."""
+    if preset not in PRESETS:
+        raise ValueError(f"found preset {preset!r}, wanted one of {', '.join(PRESETS)}: type --preset default")
+    if cap is not None and not cap > 0:
+        raise ValueError(f"found a cap of {cap:g} km/h, wanted more than 0: type --cap 20")
+    return replace(PRESETS[preset], cap=cap)
+
+
+def set_up(settings: DriverSettings, images: bool = False) -> tuple[EmbeddedWorld, CALAgent]:
+    """A world and the agent for it. images: whether the oracle, too, gets a camera.
+
+    Raises ValueError for an unknown agent or preset, FileNotFoundError or ValueError for a model that is no use.
+    """
+    if settings.agent not in AGENTS:
+        raise ValueError(f"found agent {settings.agent!r}, wanted one of {', '.join(AGENTS)}: type --agent oracle")
+    controller = Controller(controller_config(settings.preset, settings.cap), EmbeddedWorld.dt)
+    if settings.agent == "oracle":
+        world = EmbeddedWorld(CameraConfig() if images else None)
+        return world, CALAgent(OraclePerception(world.truth), controller)
+    from caldrive.perception.predictor import NetworkPerception
+
+    perception = NetworkPerception(model_path(settings.model))
+    config = perception.network.config
+    world = EmbeddedWorld(CameraConfig(width=config.image_width, height=config.image_height))
+    return world, CALAgent(perception, controller)
+
+
+def chosen_scenarios(settings: DriverSettings, n: int) -> list[Scenario]:
+    """n of the task's scenarios, from settings.route on. Raises ValueError for figures that cannot be."""
+    for name, value, least in (("cars", settings.cars, 0), ("people", settings.people, 0), ("episodes", n, 1)):
+        if value is not None and value < least:
+            raise ValueError(f"found --{name} {value}, wanted {least} or more: type --{name} {least}")
+    if settings.seed < 0:
+        raise ValueError(f"found --seed {settings.seed}, wanted 0 or more: type --seed 0")
+    found = scenarios(
+        settings.town, settings.task, settings.weather, cars=settings.cars, people=settings.people, seed=settings.seed
+    )
+    if not 0 <= settings.route < len(found):
+        raise ValueError(f"found --route {settings.route}, wanted 0 to {len(found) - 1}: type --route 0")
+    chosen = [found[(settings.route + k) % len(found)] for k in range(n)]
+    if settings.max_seconds is None:
+        return chosen
+    return [replace(one, time_limit=min(one.time_limit, settings.max_seconds)) for one in chosen]

@@ -1,0 +1,51 @@
+"""What the commands can be told: plain data with a sentence on each field, which is also its help text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
+
+
+@dataclass(frozen=True)
+class DriverSettings:
+    """Who drives, and where."""
+
+    agent: str = "cal"
+    """Who drives: cal sees the camera image only, oracle knows the truth."""
+    model: Path | None = None
+    """The network of cal, a .safetensors file; without it the one in the package."""
+    town: str = "town01"
+    """town01, town02 or an OpenDRIVE file."""
+    task: str = "navigation"
+    """straight, one-turn, navigation or navigation-dynamic."""
+    weather: int = 1
+    """One of CARLA's weathers, 1 to 14."""
+    cars: int | None = None
+    """Other cars; without it what the task prescribes."""
+    people: int | None = None
+    """Pedestrians; without it what the task prescribes."""
+    route: int = 0
+    """The first of the task's routes to drive, from 0."""
+    seed: int = 0
+    """Decides everything random: traffic, pedestrians, lights."""
+    cap: float | None = None
+    """A speed in km/h that no limit exceeds; the paper's comparison drives with 20."""
+    preset: str = "default"
+    """The controller: default, or paper for the laws as printed."""
+    max_seconds: float | None = None
+    """Ends every episode after so many simulated seconds."""
+
+
+@dataclass(frozen=True)
+class DriveSettings(DriverSettings):
+    """Drive episodes, film them, and write down what happened."""
+
+    episodes: int = 1
+    """How many episodes, one for each route from --route on."""
+    video: bool = True
+    """Whether to film the drive."""
+    out: Path = Path("out/drive")
+    """Folder for drive.mp4 and episode-000.json, 001, ..."""

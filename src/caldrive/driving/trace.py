@@ -1,0 +1,74 @@
+"""What happened in an episode, as JSON: the result, and one value a step in columns."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from typing import Any
+
+from caldrive.config import KMH
+from caldrive.datatypes import Affordances, EpisodeResult, Step
+from caldrive.episodes import scenario_to_json
+
+TRACE_VERSION = 1
+DIGITS = 4
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON knows it: rounded, and null where it is no number."""
+    if isinstance(value, float):
+        return round(value, DIGITS) if math.isfinite(value) else None
+    return value
+
+
+def _row(step: Step) -> dict[str, Any]:
+    ego, seen, decision = step.truth.ego, step.observation, step.decision
+    row: dict[str, Any] = {"time": seen.time, **asdict(ego.pose), "speed": seen.speed, "command": seen.command.value}
+    row |= asdict(step.control)
+    if decision is not None:
+        row |= {"state": decision.state.value, "speed_limit": decision.speed_limit, "note": decision.note or None}
+        row |= {"target_speed": decision.target_speed}
+    predicted: dict[str, Any] = asdict(decision.affordances if decision else Affordances())
+    row |= {f"predicted_{name}": value for name, value in predicted.items()}
+    return row | {f"true_{name}": value for name, value in asdict(step.truth.affordances).items()}
+
+
+class Trace:
+    """Collects an episode's steps. Units as in `datatypes`: s, m, rad, m/s; limits and targets in km/h."""
+
+    def __init__(self) -> None:
+        self._rows: list[dict[str, Any]] = []
+
+    def add(self, step: Step) -> None:
+        self._rows.append({name: plain(value) for name, value in _row(step).items()})
+
+    def columns(self) -> dict[str, list[Any]]:
+        """One list for each name, one entry for each step."""
+        names = self._rows[0] if self._rows else ()
+        return {name: [row.get(name) for row in self._rows] for name in names}
+
+
+def mean_speed(result: EpisodeResult) -> float:
+    """km/h over the whole episode, stops included."""
+    return result.distance / result.duration / KMH if result.duration > 0 else 0.0
+
+
+def result_values(result: EpisodeResult) -> dict[str, Any]:
+    """An EpisodeResult in JSON's types; mean_speed in km/h."""
+    broken = [asdict(one) | {"kind": one.kind.value} for one in result.infractions]
+    return {
+        "scenario": json.loads(scenario_to_json(result.scenario)),
+        "outcome": result.outcome.name.lower(),
+        "message": result.outcome.value,
+        "infractions": [{name: plain(value) for name, value in one.items()} for one in broken],
+        "comfort": {name: plain(value) for name, value in result.comfort.items()},
+        "mean_speed": plain(mean_speed(result)),
+        **{name: plain(getattr(result, name)) for name in ("duration", "distance", "route_done", "route_length")},
+    }
+
+
+def episode_json(result: EpisodeResult, trace: Trace) -> bytes:
+    """An episode's file."""
+    values = {"version": TRACE_VERSION, "result": result_values(result), "trace": trace.columns()}
+    return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"

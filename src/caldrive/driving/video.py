@@ -1,0 +1,54 @@
+"""A video file: H.264 in MP4, which every browser plays. It appears whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+
+import av
+
+from caldrive.datatypes import Image
+
+FALLBACK_CODEC = "mpeg4"  # for builds of FFmpeg without x264
+
+
+class VideoWriter:
+    """Frames (H, W, 3) in, one MP4 out. size: (width, height), both even. rate: frames in a second.
+
+    Use it in a `with` block: the file takes its name at the block's end, after an error or Ctrl-C it is gone.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int], rate: float = 10.0) -> None:
+        self.path, self.frames = path, 0
+        self._temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._container = av.open(str(self._temporary), "w", format="mp4", options={"movflags": "+faststart"})
+        codec = "libx264" if "libx264" in av.codecs_available else FALLBACK_CODEC
+        self._stream = self._container.add_stream(codec, rate=Fraction(rate).limit_denominator(1000))
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
+        if codec == "libx264":
+            self._stream.options = {"preset": "veryfast", "crf": "20"}
+        else:
+            self._stream.bit_rate = 4_000_000
+
+    def add(self, image: Image, times: int = 1) -> None:
+        """Append a frame, or the same one several times."""
+        for _ in range(times):
+            self._container.mux(self._stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+            self.frames += 1
+
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        try:
+            if kind is None and self.frames:
+                self._container.mux(self._stream.encode())
+            self._container.close()
+            if kind is None and self.frames:
+                os.replace(self._temporary, self.path)
+        finally:
+            self._temporary.unlink(missing_ok=True)

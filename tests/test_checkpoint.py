@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from caldrive.config import PERCEPTIONS
+from caldrive.perception import checkpoint
+from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, save_network, write_tensors
+from caldrive.perception.network import Network
+from tests.perception_data import TINY
+
+INFO = CheckpointInfo(TINY, {"train_frames": 10}, {"loss": 0.5}, {"steps": 3}, seed=4)
+
+
+@pytest.fixture
+def network() -> Network:
+    torch.manual_seed(0)
+    return Network(TINY).eval()
+
+
+def test_a_network_comes_back_with_all_that_belongs_to_it(network: Network, tmp_path: Path) -> None:
+    save_network(tmp_path / "model.safetensors", network, INFO)
+    found, info = load_network(tmp_path / "model.safetensors")
+    assert info == INFO
+    assert not found.training
+    for name, value in network.state_dict().items():
+        assert torch.equal(found.state_dict()[name], value)
+
+
+def test_half_precision_halves_the_file_and_hardly_changes_the_outputs(network: Network, tmp_path: Path) -> None:
+    whole, half = tmp_path / "whole.safetensors", tmp_path / "half.safetensors"
+    save_network(whole, network, INFO)
+    save_network(half, network, INFO, half=True)
+    assert half.stat().st_size < 0.65 * whole.stat().st_size
+    image = torch.randn(1, 3, 32, 64)
+    with torch.no_grad():
+        torch.testing.assert_close(load_network(half)[0].features(image), network.features(image), rtol=0, atol=0.02)
+
+
+@pytest.mark.parametrize("preset", ["small", "paper"])
+def test_configurations_survive_a_dictionary(preset: str) -> None:
+    config = PERCEPTIONS[preset]
+    assert checkpoint.config_from_dict(checkpoint.asdict(config)) == config
+
+
+def test_missing_damaged_and_foreign_files_are_told_apart(network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    with pytest.raises(CheckpointError, match="there is no checkpoint"):
+        load_network(path)
+    save_network(path, network, INFO)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(CheckpointError, match="damaged"):
+        load_network(path)
+    save_file({"a": torch.zeros(1)}, path)
+    with pytest.raises(CheckpointError, match=r"no network of caldrive"):
+        load_network(path)
+    write_tensors(path, {"a": torch.zeros(1)}, {"kind": "training"})
+    with pytest.raises(CheckpointError, match=r"model\.safetensors"):
+        load_network(path)
+
+
+def test_weights_of_another_network_are_refused(network: Network, tmp_path: Path) -> None:
+    save_network(tmp_path / "model.safetensors", network, CheckpointInfo(PERCEPTIONS["small"]))
+    with pytest.raises(CheckpointError, match="do not fit"):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_other_affordances_and_formats_are_refused(
+    network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save_network(tmp_path / "model.safetensors", network, INFO)
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "describe", list)
+        with pytest.raises(CheckpointError, match="other affordances"):
+            load_network(tmp_path / "model.safetensors")
+    monkeypatch.setattr(checkpoint, "FORMAT_VERSION", 99)
+    with pytest.raises(CheckpointError, match="format 1, this caldrive reads 99"):
+        load_network(tmp_path / "model.safetensors")

@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor
+
+from caldrive.config import TrainingConfig
+from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
+from caldrive.perception.dataset import Frames, find_episodes
+from caldrive.perception.evaluation import evaluate, outputs_of, use_bf16
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network import Network
+from caldrive.perception.training import learning_rate, train
+from tests.perception_data import HEIGHT, TINY, WIDTH, record
+
+SHORT = TrainingConfig(
+    steps=6, batch=4, window=3, warm_up=2, evaluate_every=100, save_every=2, precision="fp32", validation_share=0.3
+)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("episodes"))
+
+
+def test_learns_where_the_column_stands(folder: Path, tmp_path: Path) -> None:
+    config = replace(SHORT, steps=70, batch=6, learning_rate=3e-3, save_every=1000, augment=False)
+    network, info = load_network(train(config, folder, tmp_path, TINY, progress=False))
+    assert info.metrics["center_distance/mae"] < 0.35  # the column wanders evenly over +-1 m: guessing 0 gives 0.5
+    assert info.metrics["hazard_stop/iou"] > 0.6  # never seeing one gives 0.43
+    frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
+    assert evaluate(network, frames, "fp32")["center_distance/mae"] < 0.35
+
+
+def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) -> None:
+    whole = train(SHORT, folder, tmp_path / "whole", TINY, progress=False)
+    train(SHORT, folder, tmp_path / "killed", TINY, progress=False, stop=lambda step: step == 3)
+    assert read_tensors(tmp_path / "killed" / "state.safetensors")[1]["step"] == 2
+    resumed = train(SHORT, folder, tmp_path / "killed", TINY, progress=False)
+    assert resumed.read_bytes() == whole.read_bytes()
+    rows = [[json.loads(line) for line in (p.parent / "metrics.jsonl").open()] for p in (whole, resumed)]
+    assert [r["loss"] for r in rows[0]] == [r["loss"] for r in rows[1]]
+    assert [r["step"] for r in rows[1]] == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_state_of_other_settings_is_not_taken_up(folder: Path, tmp_path: Path) -> None:
+    train(SHORT, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 2)
+    with pytest.raises(CheckpointError, match="other settings"):
+        train(replace(SHORT, learning_rate=1.0), folder, tmp_path, TINY, progress=False)
+
+
+def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, tmp_path: Path) -> None:
+    model = train(replace(SHORT, evaluate_every=3), folder, tmp_path, TINY, progress=False)
+    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").open()]
+    assert [row["step"] for row in rows if "validation/loss" in row] == [3, 6]
+    info = load_network(model)[1]
+    assert info.metrics["loss"] == rows[-1]["validation/loss"]
+    assert info.data["validation_frames"] == 80
+
+
+def test_each_frame_passes_the_backbone_once(folder: Path) -> None:
+    network, passed = Network(TINY).eval(), []
+    frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
+    network.backbone.register_forward_hook(lambda module, args, output: passed.append(len(args[0])))
+    starts = frames.starts(4)[:8]
+    batch = frames.batch(starts, 4, network.span - 1)
+    outputs = outputs_of(network, batch, normalise(to_float(batch.images)), "cpu")
+    assert outputs["hazard_stop"].shape == (32, 2)
+    assert passed == [11]  # eight windows of four that begin one frame apart
+
+
+def test_windows_give_what_single_frames_give(folder: Path) -> None:
+    torch.manual_seed(0)
+    network = Network(TINY).eval()
+    frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
+
+    def outputs(start: int, window: int) -> dict[str, Tensor]:
+        batch = frames.batch(frames.starts(1)[[start]], window, network.span - 1)
+        return outputs_of(network, batch, normalise(to_float(batch.images)), "cpu")
+
+    with torch.no_grad():
+        together, alone = outputs(2, 5), outputs(5, 1)
+    for name in together:
+        torch.testing.assert_close(together[name][3:4], alone[name], rtol=1e-4, atol=1e-5)
+
+
+def test_the_rate_warms_up_and_falls() -> None:
+    config = TrainingConfig(steps=100, warm_up=10, learning_rate=1.0, final_rate=0.1)
+    rates = [learning_rate(step, config) for step in range(100)]
+    assert rates[0] == pytest.approx(0.1)
+    assert max(rates) == rates[10] == 1.0
+    assert rates[99] == pytest.approx(0.1, abs=0.01)
+    assert rates[10:] == sorted(rates[10:], reverse=True)
+
+
+def test_an_unknown_precision_is_named() -> None:
+    with pytest.raises(ValueError, match="auto, fp32 or bf16"):
+        use_bf16("int8", "cpu")
