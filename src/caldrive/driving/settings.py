@@ -9,6 +9,10 @@ from pathlib import Path
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
 
 
+def silent(label: str, share: float) -> None:
+    """Progress that nobody follows."""
+
+
 @dataclass(frozen=True)
 class DriverSettings:
     """Who drives, and where."""

@@ -27,6 +27,7 @@ from caldrive.datatypes import (
 )
 from caldrive.geometry import Polyline, box_corners, moved, polygon_distance, to_local, wrap_angle
 
+STRIP = 1.3  # m to either side of the route: half a car and some room
 FACING = math.radians(45)  # a sign or light counts for traffic that runs within this angle of the one it faces
 
 
@@ -81,6 +82,18 @@ def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
     return min(seen)[1] if seen else None
 
 
+def in_the_way(vehicle: VehicleState, route: Polyline, near: float | None) -> bool:
+    """Whether a car's box reaches into the strip that the ego sweeps along its route.
+
+    The areas are straight, and in a turn they sweep over cars that wait in the opposite lane: who stopped for those would
+    stand until they left, while they wait for the ego to clear the junction.
+    """
+    hit = route.project(vehicle.pose.x, vehicle.pose.y, near, window=MAX_VEHICLE_DISTANCE + 15.0)
+    across = abs(math.sin(vehicle.pose.heading - hit.heading)) * vehicle.length / 2
+    across += abs(math.cos(vehicle.pose.heading - hit.heading)) * vehicle.width / 2
+    return abs(hit.left) - across < STRIP
+
+
 def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleState]) -> float:
     """Shortest distance between the boxes of the ego and the closest car whose centre is in A3, else 50 m."""
     ahead = np.flatnonzero(A3.contains(to_local(axle, _positions(vehicles))))
@@ -103,10 +116,12 @@ def label(
 
     front_axle: metres from the ego's centre to its front axle. route: the line of the command. near: arc length near
     which the ego is on it, if known. Distance and angle are those from car to line: both are positive where the wheel
-    has to go left.
+    has to go left. Cars count in A2 and A3 only where they are in the way.
     """
     axle = moved(ego.pose, forward=front_axle)
     hit = route.project(axle.x, axle.y, near)
+    ahead = A3.contains(to_local(axle, _positions(vehicles))) | A2.contains(to_local(axle, _positions(vehicles)))
+    vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, hit.s)]
     return Affordances(
         hazard_stop=float(hazard_stop(axle, vehicles, pedestrians)),
         red_light=float(red_light(axle, lights)),

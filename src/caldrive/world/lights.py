@@ -19,7 +19,7 @@ from caldrive.world.roads import LightPost, RoadNetwork
 
 SHORTEST_GREEN, LONGEST_GREEN = 4.0, 7.0  # s
 YELLOW = 4.0  # s: a car that starts to brake for it and loses sight of it in A1 still gets through
-SHORTEST_CLEARING, LONGEST_CLEARING = 1.0, 6.0  # s with all lights red, until nobody is left inside the junction
+SHORTEST_CLEARING, LONGEST_CLEARING = 1.0, 20.0  # s with all lights red, until nobody is left inside the junction
 LOOP = 16.0  # m before the stop line where somebody who waits is noticed
 
 

@@ -22,10 +22,11 @@ Floats = NDArray[np.float64]
 
 MEAN_WALK_BETWEEN_CROSSINGS = 60.0  # s
 WIDEST_CROSSING = 22.0  # m
-CORRIDOR = 2.1  # m to either side of a car's middle
-PATIENCE = 8.0  # s of waiting at the kerb before walking on
+CORRIDOR = 2.05  # m to either side of a car's middle
+PATIENCE = 5.0  # s of waiting at the kerb before walking on, or on the road before turning back
 STOPPABLE_SPEED = 9.2  # m/s: from it a full brake stops within the hazard area A2
 SPACE_PER_PERSON = 3.0  # m of sidewalk
+KERB = 1.2  # m from the middle of the sidewalk
 STRIDE = 0.05  # m between the places of a walk that are worked out beforehand
 
 
@@ -39,6 +40,10 @@ class Crossing:
     end: Points
     end_loop: int
     end_s: float
+
+    def back(self) -> Crossing:
+        """The same way in the other direction."""
+        return Crossing(self.end_loop, self.end_s, self.end, self.start, self.loop, self.s)
 
 
 @dataclass(frozen=True)
@@ -159,17 +164,20 @@ class Pedestrians:
         rest = np.hypot(*gap.T)
         ahead = gap / np.maximum(rest, 1e-9)[:, None]
         step = self.pace[who] * dt
-        go = may_step(self.position[who], ahead * (step + 0.25)[:, None], cars)
+        # At the kerb they look over the whole road, on it only at the next step.
+        at_kerb = np.hypot(*(self.position[who] - start).T) < KERB
+        look = np.where(at_kerb, rest, step)
+        go = may_walk(self.position[who], ahead * look[:, None], self.pace[who], cars)
         self.walking[who], self.heading[who] = go, np.arctan2(ahead[:, 1], ahead[:, 0])
         self.position[who] += np.where(go, np.minimum(step, rest), 0.0)[:, None] * ahead
         done = np.hypot(*(self.position[who] - start).T)
         self.on_road[who] = np.minimum(done, rest) > SIDEWALK_WIDTH / 2
-        self.waited[who] += np.where(go | self.on_road[who], 0.0, dt)
-        for k, way, arrived in zip(who.tolist(), ways, rest <= step, strict=True):
+        self.waited[who] = np.where(go, 0.0, self.waited[who] + dt)
+        for k, way, arrived, kerb in zip(who.tolist(), ways, rest <= step, at_kerb, strict=True):
             if arrived:
                 self._arrive(k, way)
             elif self.waited[k] > PATIENCE:
-                self.crossing[k] = None
+                self.crossing[k], self.waited[k] = None if kerb else way.back(), 0.0
 
     def _arrive(self, k: int, way: Crossing) -> None:
         self.loop[k], self.s[k], self.aside[k], self.crossing[k] = way.end_loop, way.end_s, 0.0, None
@@ -189,19 +197,20 @@ class Pedestrians:
         )
 
 
-def may_step(position: Points, step: Points, cars: list[VehicleState]) -> NDArray[np.bool_]:
-    """Who of N people (N, 2) may take a step (N, 2): who thereby enters no corridor of a car that could not stop or pass."""
+def may_walk(position: Points, way: Points, pace: Floats, cars: list[VehicleState]) -> NDArray[np.bool_]:
+    """Who of N people (N, 2) may walk a stretch (N, 2) at their pace (N,): who enters no corridor of a car that by then
+    is beside them or can neither stop nor pass."""
     at = np.array([(c.pose.x, c.pose.y) for c in cars])
     heading, speed, half = np.array([(c.pose.heading, c.speed, c.length / 2) for c in cars]).T
     u, v = np.cos(heading), np.sin(heading)
-
-    def seen_from_cars(points: Points) -> tuple[Floats, Floats]:
-        d = points[:, None] - at
-        return d[..., 0] * u + d[..., 1] * v - half, np.abs(d[..., 1] * u - d[..., 0] * v)
-
-    (ahead, aside), (_, then) = seen_from_cars(position), seen_from_cars(position + step)
-    entering = (aside > CORRIDOR) & (then <= CORRIDOR)
-    beside = (ahead <= 0.8) & (ahead > -2 * half - 1.0)
+    d = position[:, None] - at
+    ahead, left = d[..., 0] * u + d[..., 1] * v - half, d[..., 1] * u - d[..., 0] * v
+    sideways = way[:, :1] * -v + way[:, 1:] * u  # how far the stretch goes across each car's corridor
+    share = np.where(np.abs(sideways) > 1e-6, (np.abs(left) - CORRIDOR) / np.maximum(np.abs(sideways), 1e-6), np.inf)
+    entering = (share > 0) & (share <= 1) & (left * sideways < 0)
+    arrives = share * np.hypot(*way.T)[:, None] / pace[:, None]
+    with np.errstate(invalid="ignore"):
+        then = ahead + share * (way[:, :1] * u + way[:, 1:] * v) - speed * arrives
     room = np.where(speed > STOPPABLE_SPEED, speed * 4.5, 3.5 + speed * 0.5 + speed**2 / 10)
-    coming = (ahead > 0) & (ahead < room) & (speed > 0.3)
-    return ~(entering & (beside | coming)).any(1)
+    blocked = (then > -2 * half - 1.0) & (then < np.where(speed > 0.3, room, 0.8))
+    return ~(entering & blocked).any(1)

@@ -136,7 +136,8 @@ class Traffic:
         d, u, v = walkers[None] - cars[:, None, :2], np.cos(cars[:, 2, None]), np.sin(cars[:, 2, None])
         ahead = d[..., 0] * u + d[..., 1] * v - cars[:, 3, None] / 2
         left = d[..., 1] * u - d[..., 0] * v
-        near = (np.abs(left) < 2.3) & (ahead > -cars[:, 3, None]) & (ahead < PEOPLE_AHEAD)
+        # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
+        near = (np.abs(left) < np.where(ahead > 1.0, 2.2, 1.2)) & (ahead > -1.0) & (ahead < PEOPLE_AHEAD)
         gap = np.where(near, np.maximum(ahead - 2.5, 0.0), np.inf).min(axis=1, initial=np.inf)
         allowed = np.sqrt(2 * COMFORTABLE_BRAKE * gap)
         held = {self.cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < cars[:, 4] + 1.0)}

@@ -1,0 +1,68 @@
+"""Drive episodes, film them, and write down what happened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from caldrive.datatypes import EpisodeResult, Scenario, Step
+from caldrive.driving.drivers import chosen_scenarios, set_up
+from caldrive.driving.film import EpisodeFilm, caption
+from caldrive.driving.outputs import require_writable_folder
+from caldrive.driving.rollout import run_episode
+from caldrive.driving.settings import DriveSettings, Progress, silent
+from caldrive.driving.trace import Trace, episode_json
+from caldrive.driving.video import VideoWriter
+from caldrive.episodes import write_whole
+
+
+@dataclass(frozen=True)
+class DriveReport:
+    """How the episodes went, the file of each, and the video if one was made."""
+
+    results: tuple[EpisodeResult, ...]
+    files: tuple[Path, ...]
+    video: Path | None
+
+
+def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
+    """Drive settings.episodes episodes; writes drive.mp4 and episode-000.json, 001, ... to settings.out.
+
+    Raises ValueError, FileNotFoundError, OSError or RuntimeError with what to type where it cannot be done.
+    """
+    require_writable_folder(settings.out)
+    scenarios = chosen_scenarios(settings, settings.episodes)
+    world, agent = set_up(settings)
+    results, files = [], []
+    with closing(world), VideoWriter(settings.out / "drive.mp4", rate=1 / world.dt) as video:
+        for k, scenario in enumerate(scenarios):
+            trace = Trace()
+            text = caption(scenario, k + 1, len(scenarios))
+            film = EpisodeFilm(video, world, scenario, text, truth=settings.agent != "oracle")
+            watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]
+            result = run_episode(world, agent, scenario, _each(watchers + [film.add] * settings.video))
+            film.end(result)
+            results.append(result)
+            files.append(settings.out / f"episode-{k:03d}.json")
+            write_whole(files[-1], episode_json(result, trace))
+    return DriveReport(tuple(results), tuple(files), video.path if video.frames else None)
+
+
+def _each(watchers: list[Callable[[Step], None]]) -> Callable[[Step], None]:
+    def watch(step: Step) -> None:
+        for watcher in watchers:
+            watcher(step)
+
+    return watch
+
+
+def _reporter(progress: Progress, scenario: Scenario, k: int, of: int) -> Callable[[Step], None]:
+    """Tells how far the drive has come: by the route, or by the time where that has gone further."""
+
+    def report(step: Step) -> None:
+        done = max(step.truth.route_done / step.truth.route_length, step.truth.time / scenario.time_limit)
+        progress(f"episode {k + 1} of {of}", (k + min(done, 1.0)) / of)
+
+    return report

@@ -1,0 +1,22 @@
+"""Where results go: looked at before the work begins, so that an hour's drive does not end at a locked door."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def require_writable_folder(folder: Path) -> None:
+    """Raises OSError where the folder neither is there to be written to nor can be made."""
+    nearest = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists())
+    if not nearest.is_dir():
+        raise OSError(f"found that {nearest} is a file, wanted a folder to write to: give another --out FOLDER")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise OSError(f"found that {nearest} cannot be written to, wanted a folder for the results: give another --out")
+
+
+def require_writable_file(path: Path) -> None:
+    """Raises OSError where a file cannot be written under that name."""
+    if path.is_dir():
+        raise OSError(f"found that {path} is a folder, wanted the name of a file: type {path / 'NAME'}")
+    require_writable_folder(path.parent)
