@@ -5,32 +5,193 @@ Exit codes: 0 for success, 1 where a check that was asked for says no, 2 for an 
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
+from tyro.conf import subcommand
 
-from caldrive.driving.settings import DriveSettings, Progress, silent
+from caldrive.driving.settings import (
+    AgentSpeedSettings,
+    DeterminismSettings,
+    DriveSettings,
+    Progress,
+    WorldSpeedSettings,
+    silent,
+)
 
-Answer = tuple[int, dict[str, Any]]  # exit code, what --json prints
+DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
+STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None
 
 
 @dataclass(frozen=True)
-class Drive(DriveSettings):
+class Answer:
+    """What a command found: values for --json, something to show to people, and the exit code."""
+
+    values: dict[str, Any]
+    shown: Any
+    code: int = 0
+
+
+@dataclass(frozen=True)
+class Output:
     json: bool = False
-    """Print the results as JSON."""
+    """Print the result as JSON, and nothing else."""
+
+
+@dataclass(frozen=True)
+class Drive(DriveSettings, Output):
     strict: bool = False
     """End with exit code 1 unless every episode reached its goal."""
 
     def run(self, progress: Progress) -> Answer:
-        from caldrive.driving import drive, tables, trace
+        from caldrive.driving.drive import drive
+        from caldrive.driving.tables import drive_table
 
-        report = drive.drive(self, progress)
-        failed = sum(result.outcome is not drive.Outcome.SUCCESS for result in report.results)
-        return int(self.strict and failed > 0), {}
+        report = drive(self, progress)
+        return Answer(report.values(), drive_table(report), int(self.strict and not report.all_reached))
+
+
+@dataclass(frozen=True)
+class Town(Output):
+    town: str = "town01"
+    """town01, town02 or an OpenDRIVE file."""
+    sheet: Path = Path("out/town.png")
+    """The PNG file to write."""
+    width: int | None = None
+    """Its width in pixels."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.sheet import write_sheet
+
+        progress("drawing", 0.0)
+        width, height = write_sheet(self.town, self.sheet, self.width)
+        values = {"town": self.town, "sheet": str(self.sheet), "width": width, "height": height}
+        return Answer(values, f"{self.town} on one page: {self.sheet} ({width} x {height})")
+
+
+@dataclass(frozen=True)
+class WorldSpeed(WorldSpeedSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.speed import measure_world
+
+        speed = measure_world(self, progress)  # times the imports, too: nothing is loaded before it
+        from caldrive.driving.tables import world_table
+
+        return Answer(asdict(speed), world_table(speed))
+
+
+@dataclass(frozen=True)
+class AgentSpeed(AgentSpeedSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.speed import measure_agent
+
+        speed = measure_agent(self, progress)
+        said = (
+            f"from image to control: {speed.median_ms:.1f} ms at the median, {speed.p99_ms:.1f} ms in 99 of 100 cases"
+        )
+        return Answer(asdict(speed), f"{said} ({speed.width} x {speed.height})")
+
+
+@dataclass(frozen=True)
+class Determinism(DeterminismSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.determinism import check_determinism
+
+        found = check_determinism(self, progress)
+        said = found.difference or f"equal in all {found.steps} steps, sha256 {found.digest[:16]}"
+        return Answer(asdict(found) | {"equal": found.equal}, said, int(not found.equal))
+
+
+Speed = (
+    Annotated[WorldSpeed, subcommand("world", description="Camera steps a second, and where the time goes.")]
+    | Annotated[AgentSpeed, subcommand("agent", description="Milliseconds from image to control.")]
+)
+Command = (
+    Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
+    | Annotated[Town, subcommand("town", description="Draw a town on one page.")]
+    | Annotated[Speed, subcommand("speed", description="Measure how fast the world or the agent is.")]
+    | Annotated[
+        Determinism, subcommand("determinism", description="Drive the same episode twice and compare all bytes.")
+    ]
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit code."""
+    try:
+        command = _parse(arguments)
+        with _progress() as progress:
+            answer: Answer = command.run(progress)
+        _print(answer, command.json)
+        return answer.code
+    except KeyboardInterrupt:
+        print("caldrive: stopped by Ctrl-C", file=sys.stderr)
+        return 130
+    except (ValueError, OSError, RuntimeError) as error:
+        if os.environ.get("CALDRIVE_TRACEBACK"):  # for those who look for the cause in the code
+            raise
+        print(f"caldrive: {_sentence(error)}", file=sys.stderr)
+        return 2
+
+
+def _parse(arguments: Sequence[str] | None) -> Any:
+    """The command, or exit with one sentence in place of the parser's box."""
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return tyro.cli(Command, prog="caldrive", description=DESCRIPTION, args=arguments, config=STYLE)
+    except SystemExit as end:
+        if end.code:
+            raise ValueError(_first_message(said.getvalue())) from end
+        raise
+
+
+def _first_message(box: str) -> str:
+    """The text in the upper part of a box that the parser has drawn."""
+    lines = [line.strip("│ \n") for line in box.splitlines()[1:]]
+    end = next((i for i, line in enumerate(lines) if not line.strip("─╰╯")), len(lines))
+    return " ".join(lines[:end]).rstrip(".") + ": type caldrive --help"
+
+
+def _sentence(error: Exception) -> str:
+    """An error in one line."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"cannot use {error.filename}: {error.strerror.lower()}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """A bar on stderr, where people sit before it."""
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda label, share: bar.update(task, description=label, completed=share)
+
+
+def _print(answer: Answer, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(answer.values, allow_nan=False))
+        return
+    from rich.console import Console
+
+    Console().print(answer.shown, highlight=False)

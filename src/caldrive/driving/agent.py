@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from caldrive.control.controller import Controller
 from caldrive.datatypes import Affordances, Control, Decision, Observation, Perception, Truth
+
+NOTHING = Affordances(*(math.nan,) * 2, None, *(math.nan,) * 3)  # what an image tells that is no use
 
 
 class CALAgent:
@@ -22,10 +26,22 @@ class CALAgent:
         self.decision = None
 
     def act(self, observation: Observation) -> Control:
-        """The control for this observation."""
-        affordances = self.perception.predict(observation)
-        self.decision = self.controller.step(affordances, observation.speed, observation.command)
+        """The control for this observation; where its image is no use, the brake, and the reason in the note."""
+        affordances, note = self._see(observation)
+        decision = self.controller.step(affordances, observation.speed, observation.command)
+        self.decision = replace(decision, note=note or decision.note)
         return self.decision.control
+
+    def _see(self, observation: Observation) -> tuple[Affordances, str]:
+        """The affordances, or nothing and why."""
+        try:
+            return self.perception.predict(observation), ""
+        except ValueError as error:
+            from caldrive.perception.predictor import BadImage  # with torch, which the oracle does without
+
+            if not isinstance(error, BadImage):
+                raise
+            return NOTHING, str(error)
 
 
 class OraclePerception:

@@ -6,14 +6,15 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from caldrive.datatypes import EpisodeResult, Scenario, Step
+from caldrive.datatypes import EpisodeResult, Outcome, Scenario, Step
 from caldrive.driving.drivers import chosen_scenarios, set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriveSettings, Progress, silent
-from caldrive.driving.trace import Trace, episode_json
+from caldrive.driving.trace import Trace, episode_json, result_values
 from caldrive.driving.video import VideoWriter
 from caldrive.episodes import write_whole
 
@@ -25,6 +26,16 @@ class DriveReport:
     results: tuple[EpisodeResult, ...]
     files: tuple[Path, ...]
     video: Path | None
+
+    @property
+    def all_reached(self) -> bool:
+        """Whether every episode ended at its goal in time."""
+        return all(result.outcome is Outcome.SUCCESS for result in self.results)
+
+    def values(self) -> dict[str, Any]:
+        """The report in JSON's types."""
+        episodes = [{"file": str(f), **result_values(r)} for f, r in zip(self.files, self.results, strict=True)]
+        return {"video": str(self.video) if self.video else None, "episodes": episodes}
 
 
 def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:

@@ -38,6 +38,24 @@ def controller_config(preset: str, cap: float | None) -> ControlConfig:
     return replace(PRESETS[preset], cap=cap)
 
 
+def oracle(camera: CameraConfig | None, config: ControlConfig) -> tuple[EmbeddedWorld, CALAgent]:
+    """A world and the agent that knows its truth."""
+    world = EmbeddedWorld(camera)
+    return world, CALAgent(OraclePerception(world.truth), Controller(config, world.dt))
+
+
+def network_agent(
+    model: Path | None, config: ControlConfig, threads: int | None = None
+) -> tuple[CALAgent, CameraConfig]:
+    """The agent that drives by a network, and the camera that it needs."""
+    from caldrive.perception.predictor import NetworkPerception
+
+    perception = NetworkPerception(model_path(model), threads=threads)
+    size = perception.network.config
+    camera = CameraConfig(width=size.image_width, height=size.image_height)
+    return CALAgent(perception, Controller(config, EmbeddedWorld.dt)), camera
+
+
 def set_up(settings: DriverSettings, images: bool = False) -> tuple[EmbeddedWorld, CALAgent]:
     """A world and the agent for it. images: whether the oracle, too, gets a camera.
 
@@ -45,16 +63,11 @@ def set_up(settings: DriverSettings, images: bool = False) -> tuple[EmbeddedWorl
     """
     if settings.agent not in AGENTS:
         raise ValueError(f"found agent {settings.agent!r}, wanted one of {', '.join(AGENTS)}: type --agent oracle")
-    controller = Controller(controller_config(settings.preset, settings.cap), EmbeddedWorld.dt)
+    config = controller_config(settings.preset, settings.cap)
     if settings.agent == "oracle":
-        world = EmbeddedWorld(CameraConfig() if images else None)
-        return world, CALAgent(OraclePerception(world.truth), controller)
-    from caldrive.perception.predictor import NetworkPerception
-
-    perception = NetworkPerception(model_path(settings.model))
-    config = perception.network.config
-    world = EmbeddedWorld(CameraConfig(width=config.image_width, height=config.image_height))
-    return world, CALAgent(perception, controller)
+        return oracle(CameraConfig() if images else None, config)
+    agent, camera = network_agent(settings.model, config)
+    return EmbeddedWorld(camera), agent
 
 
 def chosen_scenarios(settings: DriverSettings, n: int) -> list[Scenario]:
@@ -64,12 +77,14 @@ def chosen_scenarios(settings: DriverSettings, n: int) -> list[Scenario]:
             raise ValueError(f"found --{name} {value}, wanted {least} or more: type --{name} {least}")
     if settings.seed < 0:
         raise ValueError(f"found --seed {settings.seed}, wanted 0 or more: type --seed 0")
+    if settings.seconds is not None and not settings.seconds > 0:
+        raise ValueError(f"found --seconds {settings.seconds:g}, wanted more than 0: type --seconds 60")
     found = scenarios(
         settings.town, settings.task, settings.weather, cars=settings.cars, people=settings.people, seed=settings.seed
     )
     if not 0 <= settings.route < len(found):
         raise ValueError(f"found --route {settings.route}, wanted 0 to {len(found) - 1}: type --route 0")
     chosen = [found[(settings.route + k) % len(found)] for k in range(n)]
-    if settings.max_seconds is None:
+    if settings.seconds is None:
         return chosen
-    return [replace(one, time_limit=min(one.time_limit, settings.max_seconds)) for one in chosen]
+    return [replace(one, time_limit=min(one.time_limit, settings.seconds)) for one in chosen]

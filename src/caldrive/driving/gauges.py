@@ -86,6 +86,8 @@ def draw_gauges(draw: Draw, seen: Affordances, true: Affordances | None) -> None
 def _draw_signs(draw: Draw, row: int, value: float, real: float | None) -> None:
     for i, sign in enumerate(SPEED_SIGNS):
         box, lit = _sign_box(row, i), value == sign
-        draw.rounded_rectangle(box, 4, fill=TEXT if lit else TRACK, outline=RED if lit or real == sign else None, width=2)
+        draw.rounded_rectangle(
+            box, 4, fill=TEXT if lit else TRACK, outline=RED if lit or real == sign else None, width=2
+        )
         middle = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
         write(draw, middle, str(sign), 13, (20, 20, 20) if lit else MUTED, "mm")

@@ -36,7 +36,7 @@ SIZE = (CAMERA.width, CAMERA.height + PANEL)
 HEADER = 34
 BANNER_TIME = 2.0  # s that an infraction stays on the screen
 TILE = (16, 16, 112, 112)  # where the command's arrow is
-SPEED, SIGN = (226, 62), (276, 56)
+SPEED, SIGN = (226, 56), (276, 56)
 STATES: dict[DriveState, Color] = {
     DriveState.CRUISING: (34, 140, 80),
     DriveState.FOLLOWING: (40, 105, 190),
@@ -70,7 +70,7 @@ def _frame(truth: bool) -> Picture.Image:
     panel = Picture.new("RGB", (CAMERA.width, PANEL), BACKGROUND)
     draw = ImageDraw.Draw(panel)
     draw_frame(draw, truth)
-    write(draw, (SPEED[0] - 36, SPEED[1] + 34), "km/h", 14, MUTED, "mm")
+    write(draw, (SPEED[0] - 36, SPEED[1] + 44), "km/h", 14, MUTED, "mm")
     for row, name in enumerate(("throttle", "brake", "steer")):
         write(draw, (16, _bar(row)[1] + 5), name, 14, MUTED)
         track(draw, _bar(row))

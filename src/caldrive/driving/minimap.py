@@ -45,7 +45,9 @@ class MiniMap:
         """The map as of now."""
         picture = self._base.copy()
         draw = ImageDraw.Draw(picture)
-        _dots(draw, self.pixels(np.array([(p.pose.x, p.pose.y) for p in truth.pedestrians]).reshape(-1, 2)), 1.5, PERSON)
+        _dots(
+            draw, self.pixels(np.array([(p.pose.x, p.pose.y) for p in truth.pedestrians]).reshape(-1, 2)), 1.5, PERSON
+        )
         _dots(draw, self.pixels(np.array([(v.pose.x, v.pose.y) for v in truth.vehicles]).reshape(-1, 2)), 2.5, CAR)
         _dots(draw, self.pixels(np.array([(self.goal.x, self.goal.y)])), 5.0, GOAL)
         draw.polygon(self.pixels(self._arrow(truth.ego.pose)), fill=EGO, outline=(0, 0, 0))

@@ -39,7 +39,7 @@ class DriverSettings:
     """A speed in km/h that no limit exceeds; the paper's comparison drives with 20."""
     preset: str = "default"
     """The controller: default, or paper for the laws as printed."""
-    max_seconds: float | None = None
+    seconds: float | None = None
     """Ends every episode after so many simulated seconds."""
 
 
@@ -50,6 +50,46 @@ class DriveSettings(DriverSettings):
     episodes: int = 1
     """How many episodes, one for each route from --route on."""
     video: bool = True
-    """Whether to film the drive."""
+    """Do not film the drive."""
     out: Path = Path("out/drive")
     """Folder for drive.mp4 and episode-000.json, 001, ..."""
+
+
+@dataclass(frozen=True)
+class DeterminismSettings(DriverSettings):
+    """Drive the same episode in two fresh processes and compare every image, control and truth."""
+
+    task: str = "navigation-dynamic"
+    """straight, one-turn, navigation or navigation-dynamic."""
+    seconds: float | None = 60.0
+    """Compares so many simulated seconds."""
+
+
+@dataclass(frozen=True)
+class WorldSpeedSettings:
+    """Camera steps a second in one process at 200 x 88, and which part takes how long."""
+
+    town: str = "town01"
+    """town01, town02 or an OpenDRIVE file."""
+    weather: int = 1
+    """One of CARLA's weathers, 1 to 14."""
+    cars: int = 20
+    """Other cars."""
+    people: int = 50
+    """Pedestrians."""
+    steps: int = 600
+    """How many steps to measure."""
+    seed: int = 0
+    """Decides everything random."""
+
+
+@dataclass(frozen=True)
+class AgentSpeedSettings:
+    """Milliseconds from image to control."""
+
+    model: Path | None = None
+    """The network, a .safetensors file; without it the one in the package."""
+    steps: int = 300
+    """How many images to measure."""
+    threads: int | None = None
+    """Threads for the network; without it as many as the machine has cores."""

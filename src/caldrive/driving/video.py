@@ -18,7 +18,8 @@ FALLBACK_CODEC = "mpeg4"  # for builds of FFmpeg without x264
 class VideoWriter:
     """Frames (H, W, 3) of one even size in, one MP4 out. rate: frames in a second.
 
-    Use it in a `with` block: the file takes its name at the block's end; after an error, Ctrl-C or no frame there is none.
+    Use it in a `with` block: the file takes its name at the block's end. After an error or without a frame there is
+    none.
     """
 
     def __init__(self, path: Path, rate: float = 10.0) -> None:

@@ -14,7 +14,7 @@ from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved
 from caldrive.world import shaders
-from caldrive.world.ground import ground_mesh
+from caldrive.world.ground import ground_mesh, road_mesh, yard_mesh
 from caldrive.world.meshes import Mesh, box, merge, turned
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import Prop
@@ -53,7 +53,7 @@ class Camera:
         self.roads = roads
         self.context = gl_context()
         things = [turned(box((0, 0, p.height / 2), (p.length, p.width, p.height), (170, 140, 120)), p.pose) for p in scenery]
-        mesh = merge((ground_mesh(roads), *things))
+        mesh = merge((road_mesh(roads), ground_mesh(roads), yard_mesh(roads), *things))
         self._program = self.context.program(shaders.STATIC_VERTEX, shaders.STATIC_FRAGMENT)
         self._frame = self.context.buffer(reserve=80)
         self._look = self.context.buffer(reserve=112)

@@ -12,6 +12,7 @@ from caldrive.datatypes import Contact, ContactKind, PedestrianState, Points, Po
 from caldrive.geometry import box_corners, push_out, to_local
 
 PERSON_MASS, CAR_MASS = 75.0, 1400.0  # kg
+TOUCH = 1e-6  # m: boxes that overlap by less, as after a push, have no contact
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,17 @@ def _impulse(ego: VehicleState, other: Obstacle, normal: Points) -> float:
 
 
 def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleState, tuple[Contact, ...]]:
-    """The ego pushed out of what it overlaps and slowed by it, and the contacts. A glancing hit slides along."""
+    """The ego pushed out of what it overlaps and slowed (from behind: sped up) by it, and the contacts. A glancing hit slides along."""
     contacts = []
     for other in obstacles:
         reach = math.hypot(ego.length + other.length, ego.width + other.width) / 2
         if math.hypot(other.pose.x - ego.pose.x, other.pose.y - ego.pose.y) > reach:
             continue
         shift = push_out(box_corners(ego.pose, ego.length, ego.width), box_corners(other.pose, other.length, other.width))
-        if shift is None:
+        depth = 0.0 if shift is None else float(np.linalg.norm(shift))
+        if shift is None or depth < TOUCH:
             continue
-        depth = float(np.linalg.norm(shift))
-        normal = shift / depth if depth > 1e-9 else np.array([-math.cos(ego.pose.heading), -math.sin(ego.pose.heading)])
+        normal = shift / depth
         impulse = _impulse(ego, other, normal)
         touch = np.array([other.pose.x, other.pose.y])
         contacts.append(Contact(other.kind, other.id, impulse, _at_fault(ego, touch, other)))
@@ -73,7 +74,7 @@ def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleSt
 
 def _pushed(ego: VehicleState, other: Obstacle, shift: Points, normal: Points, impulse: float) -> VehicleState:
     along = float(normal @ (math.cos(ego.pose.heading), math.sin(ego.pose.heading)))
-    speed = max(0.0, ego.speed - abs(along) * impulse / CAR_MASS)
+    speed = max(0.0, ego.speed + along * impulse / CAR_MASS)
     if other.kind is ContactKind.PERSON:  # a person is knocked aside and does not hold the car
         return replace(ego, speed=speed)
     pose = Pose(ego.pose.x + float(shift[0]), ego.pose.y + float(shift[1]), ego.pose.heading)

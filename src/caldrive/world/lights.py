@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
 from caldrive.world.roads import LightPost, RoadNetwork
 
-SHORTEST_GREEN, LONGEST_GREEN = 4.0, 7.0  # s
-YELLOW = 4.0  # s: a car that starts to brake for it and loses sight of it in A1 still gets through
+SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
+YELLOW = 3.5  # s: a car that starts to brake for it and loses sight of it in A1 still gets through
 SHORTEST_CLEARING, LONGEST_CLEARING = 1.0, 20.0  # s with all lights red, until nobody is left inside the junction
-LOOP = 16.0  # m before the stop line where somebody who waits is noticed
+LOOP = 24.0  # m before the stop line where somebody who waits is noticed
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,9 @@ def quads(corners: ArrayLike, color: ArrayLike, uv: ArrayLike = (0, 0, 0), slot:
     return Mesh(made.reshape(-1), (first[:, None] + corners_of).reshape(-1, 3).astype(np.uint32))
 
 
-def wall(points: ArrayLike, low: float, high: float, color: RGB, layer: int = 0, tile: float = 1.0, slot: int = 0) -> Mesh:
+def wall(
+    points: ArrayLike, low: float, high: float, color: RGB, layer: int = 0, tile: float = 1.0, slot: int = 0
+) -> Mesh:
     """A vertical wall over a line of points (N, 2), seen from its right side; uv in tiles of `tile` metres."""
     p = np.asarray(points, dtype=float)
     s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1)))) / tile

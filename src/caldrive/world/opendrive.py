@@ -47,13 +47,14 @@ def _along_polynomial(start: Pose, shape: ET.Element, ds: float, length: float) 
 
 
 def _standing(road: ET.Element, thing: ET.Element, heading_name: str) -> Pose:
-    """Pose of a sign or signal; heading: that of the traffic it faces."""
+    """Pose of a sign or signal; heading: that of the traffic it faces, which drives on the right."""
     s, t = _number(thing, "s"), _number(thing, "t")
     geometries = road.findall("planView/geometry")
     here = [g for g in geometries if _number(g, "s") <= s + 1e-6][-1]
     offset = 0.0 if t < 0 else math.pi
     if thing.get(heading_name):
-        offset = _number(thing, heading_name)
+        # CARLA counts it from the road, the standard from the thing's orientation: they differ by half a turn.
+        offset += math.remainder(_number(thing, heading_name) - offset, math.pi)
     return moved(_along(here, s - _number(here, "s")), left=t, turn=offset)
 
 
@@ -68,10 +69,15 @@ def read_furniture(path: Path) -> tuple[list[Pose], list[Sign]]:
     """Posts of traffic lights and speed signs of an OpenDRIVE map, each once. Raises ValueError for a broken file."""
     try:
         root = ET.parse(path).getroot()
-    except ET.ParseError as error:
+        furniture = _furniture(root)
+    except (ET.ParseError, ValueError, IndexError) as error:
         raise ValueError(f"{path} is no readable OpenDRIVE map ({error}): give another .xodr file") from error
     if root.tag != "OpenDRIVE":
         raise ValueError(f"{path} holds <{root.tag}>, wanted <OpenDRIVE>: give an .xodr file")
+    return furniture
+
+
+def _furniture(root: ET.Element) -> tuple[list[Pose], list[Sign]]:
     posts, signs = [], {}
     for road in root.findall("road"):
         for thing in [*road.findall("signals/signal"), *road.findall("objects/object")]:

@@ -200,8 +200,8 @@ class Pedestrians:
 def may_walk(position: Points, way: Points, pace: Floats, cars: list[VehicleState]) -> NDArray[np.bool_]:
     """Who of N people (N, 2) may walk a stretch (N, 2) at their pace (N,): who enters no corridor of a car that by then
     is beside them or can neither stop nor pass."""
-    at = np.array([(c.pose.x, c.pose.y) for c in cars])
-    heading, speed, half = np.array([(c.pose.heading, c.speed, c.length / 2) for c in cars]).T
+    at = np.array([(c.pose.x, c.pose.y) for c in cars]).reshape(-1, 2)
+    heading, speed, half = np.array([(c.pose.heading, c.speed, c.length / 2) for c in cars]).reshape(-1, 3).T
     u, v = np.cos(heading), np.sin(heading)
     d = position[:, None] - at
     ahead, left = d[..., 0] * u + d[..., 1] * v - half, d[..., 1] * u - d[..., 0] * v

@@ -7,26 +7,32 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
-from caldrive.geometry import box_corners
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 
-SETBACK = 1.3  # m from the sidewalk to a façade, at least 1 m after rounding at corners
-TREE_LINE = 2.5  # m from the kerb: the sidewalk's outer third
-LAMP_LINE = 0.55  # m from the kerb
+SETBACK = 1.4  # m from the sidewalk to a façade
+PUSHED_BACK = (0.0, 1.0, 2.5)  # m more where a bend leaves too little room
+TREE_LINE = 2.6  # m from the kerb: the sidewalk's outer third
+LAMP_LINE = 0.55
+YARD_LINE = SIDEWALK_WIDTH + 1.2
+CLEAR_OF_POSTS = 6.5  # m around lights and signs without trees, which would hide them
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Prop:
     """A thing that stands still: pose of its centre, its solid box in metres, and which of its kind it is.
 
-    label: the limit on a speed sign, else 0. A tree's box is its trunk, its height includes the crown.
+    A building's heading looks at the road. A tree's box is its trunk, its height includes the crown. label: the limit on
+    a speed sign, else 0.
     """
 
     kind: str
@@ -41,7 +47,7 @@ class Prop:
 
 @dataclass(frozen=True)
 class Style:
-    """Sizes of what lines the streets. frontage, depth, height, tree_gap: (least, most) metres; gap: share of empty plots."""
+    """What lines a town's streets. frontage, depth, tree_gap, tree_height: (least, most) metres; gap: share of empty plots."""
 
     buildings: int
     frontage: tuple[float, float]
@@ -49,92 +55,159 @@ class Style:
     floors: tuple[int, int]
     floor: float
     gap: float
-    trees: int
     tree_gap: tuple[float, float]
     tree_height: tuple[float, float]
+    in_gaps: tuple[str, ...]
 
 
 STYLES = {
-    "town01": Style(6, (9, 17), (9, 13), (2, 4), 3.1, 0.16, 2, (9, 18), (5.5, 8.0)),
-    "town02": Style(5, (13, 26), (10, 15), (2, 7), 3.4, 0.28, 2, (12, 26), (6.0, 9.0)),
-}
+    "town01": Style(6, (9, 16), (9, 12), (2, 4), 3.1, 0.15, (9, 20), (5.0, 7.5), ("hedge", "hedge", "billboard", "fence")),
+    "town02": Style(6, (12, 24), (10, 14), (2, 6), 3.4, 0.25, (12, 28), (6.0, 9.0), ("fence", "container", "billboard", "wall")),
+}  # fmt: skip
+_SIZES = {  # length (towards the road), width, height in metres
+    "lamp": (0.2, 0.2, 6.2), "bin": (0.45, 0.45, 0.95), "bench": (0.55, 1.7, 0.85), "hydrant": (0.3, 0.3, 0.75),
+    "box": (0.5, 0.9, 1.25), "hedge": (0.9, 7.0, 1.3), "fence": (0.15, 8.0, 1.5), "wall": (0.3, 8.0, 2.0),
+    "container": (2.4, 6.0, 2.6), "billboard": (0.4, 4.6, 4.4),
+}  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Place:
-    """A point on a line beside the road: s along the line, and the heading that looks away from the road."""
-
-    s: float
-    x: float
-    y: float
-    outward: float
-
-
-class _Kerb:
-    """A closed line at a fixed distance from the roadway, walked with the road on the left."""
+class _Line:
+    """A closed line at a fixed distance from the roadway, walked with the road on its left."""
 
     def __init__(self, ring: shapely.LinearRing) -> None:
-        self.points = shapely.get_coordinates(ring)
+        self.points: Points = shapely.get_coordinates(ring)
         steps = np.diff(self.points, axis=0)
         self.s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
+        self.length = float(self.s[-1])
 
-    def at(self, s: float) -> tuple[float, float]:
-        return float(np.interp(s, self.s, self.points[:, 0])), float(np.interp(s, self.s, self.points[:, 1]))
+    def at(self, s: Floats) -> Points:
+        return np.stack([np.interp(s, self.s, self.points[:, k]) for k in (0, 1)], axis=1)
 
-    def place(self, s: float, reach: float = 0.5) -> _Place:
-        """The place at s; its heading is perpendicular to the chord from s - reach to s + reach."""
-        (x0, y0), (x1, y1) = self.at(max(s - reach, 0.0)), self.at(min(s + reach, self.s[-1]))
-        x, y = (x0 + x1) / 2, (y0 + y1) / 2
-        return _Place(s, x, y, math.atan2(x0 - x1, y1 - y0))
-
-
-def _kerbs(roads: RoadNetwork, distance: float) -> list[_Kerb]:
-    area = roads.roadway.buffer(distance)
-    parts = shapely.get_parts(area)
-    rings = [ring for p in parts for ring in (shapely.orient_polygons(p).exterior, *shapely.orient_polygons(p).interiors)]
-    return [_Kerb(ring) for ring in rings if ring.length > 20]
+    def places(self, s: Floats, reach: Floats) -> tuple[Points, Floats]:
+        """Middles (N, 2) of the chords from s - reach to s + reach, and the headings (N,) that look away from the road."""
+        a, b = self.at(np.maximum(s - reach, 0)), self.at(np.minimum(s + reach, self.length))
+        d = b - a
+        return (a + b) / 2, np.arctan2(-d[:, 0], d[:, 1])
 
 
-def _outward(place: _Place, distance: float) -> tuple[float, float]:
-    return place.x + distance * math.cos(place.outward), place.y + distance * math.sin(place.outward)
+def _lines(roads: RoadNetwork, distance: float) -> list[_Line]:
+    parts = shapely.get_parts(shapely.orient_polygons(roads.roadway.buffer(distance)))
+    return [_Line(ring) for p in parts for ring in (p.exterior, *p.interiors) if ring.length > 20]
+
+
+def _beyond(points: Points, outward: Floats, distance: Floats) -> Points:
+    return points + distance[:, None] * np.stack((np.cos(outward), np.sin(outward)), axis=1)
+
+
+def _boxes(center: Points, heading: Floats, length: Floats, width: Floats) -> NDArray[np.object_]:
+    """Oriented rectangles as shapely polygons."""
+    ahead = np.stack((np.cos(heading), np.sin(heading)), axis=1) * length[:, None] / 2
+    left = np.stack((-np.sin(heading), np.cos(heading)), axis=1) * width[:, None] / 2
+    ring = np.stack((ahead + left, left - ahead, -ahead - left, ahead - left), axis=1) + center[:, None]
+    return np.asarray(shapely.polygons(ring))
+
+
+def _without_overlaps(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Which shapes to keep so that none overlaps an earlier one."""
+    keep = np.ones(len(shapes), dtype=bool)
+    tree = shapely.STRtree(shapes)
+    for i, j in sorted(zip(*tree.query(shapes, predicate="intersects").tolist(), strict=True)):
+        if i < j and keep[i]:
+            keep[j] = False
+    return keep
+
+
+def _walk(length: float, least: float, most: float, rng: np.random.Generator) -> Floats:
+    """Sizes of plots that fill a length one after the other."""
+    sizes = rng.uniform(least, most, int(length / least) + 1)
+    return sizes[np.cumsum(sizes) <= length]
+
+
+def _plots(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> tuple[Points, Floats, Floats]:
+    """Middles of the plots' street sides, headings away from the road, and frontages."""
+    found = []
+    for line in _lines(roads, SIDEWALK_WIDTH + SETBACK):
+        width = _walk(line.length, *style.frontage, rng)
+        found.append((*line.places(np.cumsum(width) - width / 2, width / 2), width))
+    middles, outward, width = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return middles, outward, width
 
 
 def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> Iterator[Prop]:
+    """Houses on their plots, and what stands in the gaps between them."""
+    middles, outward, frontage = _plots(roads, style, rng)
+    n = len(frontage)
+    width, depth = frontage - rng.uniform(0.1, 0.9, n), rng.uniform(*style.depth, n)
+    built = rng.random(n) >= style.gap
+    floors, variant = rng.integers(style.floors[0], style.floors[1] + 1, n), rng.integers(style.buildings, size=n)
     keep_off = roads.roadway.buffer(SIDEWALK_WIDTH + 1.0)
     shapely.prepare(keep_off)
-    taken: list[Points] = []
-    for kerb in _kerbs(roads, SIDEWALK_WIDTH + SETBACK):
-        s = float(rng.uniform(0, 6))
-        while s < kerb.s[-1] - style.frontage[0]:
-            width, depth = rng.uniform(*style.frontage), rng.uniform(*style.depth)
-            floors, variant = int(rng.integers(style.floors[0], style.floors[1] + 1)), int(rng.integers(style.buildings))
-            free = rng.random() >= style.gap
-            place = kerb.place(s + width / 2, width / 2)
-            pose = _first_free(place, width, depth, keep_off, taken) if free else None
-            if pose is not None:
-                taken.append(np.array([pose.x, pose.y, math.hypot(depth, width) / 2]))
-                yield Prop("building", pose, depth, width, floors * style.floor, variant)
-            s += width + float(rng.uniform(0.0, 0.8)) if pose is not None or not free else 2.0
+    center, fits = np.zeros((n, 2)), np.zeros(n, dtype=bool)
+    for back in PUSHED_BACK:
+        tried = _beyond(middles, outward, depth / 2 + back)
+        free = ~fits & ~shapely.intersects(keep_off, _boxes(tried, outward, depth, width))
+        center[free] = tried[free]
+        fits |= free
+    chosen = np.flatnonzero(built & fits)
+    chosen = chosen[_without_overlaps(_boxes(center[chosen], outward[chosen], depth[chosen], width[chosen]))]
+    for i in chosen:
+        pose = Pose(*map(float, center[i]), float(outward[i]) + math.pi)
+        yield Prop("building", pose, depth[i], width[i], floors[i] * style.floor, int(variant[i]))
+    houses = _boxes(center[chosen], outward[chosen], depth[chosen] + 0.5, width[chosen] + 0.5)
+    empty = np.setdiff1d(np.arange(n), chosen)
+    yield from _in_gaps(middles[empty], outward[empty], shapely.union_all(houses), keep_off, style, rng)
 
 
-def _first_free(
-    place: _Place, width: float, depth: float, keep_off: shapely.Geometry, taken: list[Points]
-) -> Pose | None:
-    """Where a building fits behind the kerb, pushed back a little on bends; the heading looks at the road."""
-    for back in (0.0, 0.8, 2.0):
-        pose = Pose(*_outward(place, depth / 2 + back), place.outward + math.pi)
-        corners = box_corners(pose, depth, width)
-        if keep_off.intersects(shapely.Polygon(corners)):
-            continue
-        near = [t for t in taken if math.hypot(t[0] - pose.x, t[1] - pose.y) < t[2] + math.hypot(depth, width) / 2]
-        if not near:
-            return pose
-    return None
+def _in_gaps(
+    at: Points, outward: Floats, houses: shapely.Geometry, keep_off: shapely.Geometry, style: Style, rng: np.random.Generator
+) -> Iterator[Prop]:
+    kinds = [style.in_gaps[k] for k in rng.integers(len(style.in_gaps), size=len(at))]
+    length, width = (np.array([_SIZES[kind][k] for kind in kinds]) for k in (0, 1))
+    center = _beyond(at, outward, length / 2 + 0.3)
+    shapes = _boxes(center, outward, length, width)
+    free = ~shapely.intersects(houses, shapes) & ~shapely.intersects(keep_off, shapes)
+    for i in np.flatnonzero(free)[_without_overlaps(shapes[free])]:
+        pose = Pose(*map(float, center[i]), float(outward[i]) + math.pi)
+        yield Prop(kinds[i], pose, *_SIZES[kinds[i]], variant=int(rng.integers(4)))
+
+
+def _along(roads: RoadNetwork, distance: float, gap: tuple[float, float], rng: np.random.Generator) -> tuple[Points, Floats]:
+    found = []
+    for line in _lines(roads, distance):
+        s = np.cumsum(_walk(line.length - gap[0] / 2, *gap, rng))
+        found.append(line.places(s, np.full(len(s), 0.4)))
+    at, outward = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return at, outward
+
+
+def _clear(at: Points, props: Sequence[Prop], distance: float) -> NDArray[np.bool_]:
+    """Which points lie further than a distance from all props' centres."""
+    others = np.array([(p.pose.x, p.pose.y) for p in props]).reshape(-1, 2)
+    gaps = np.hypot(*(at[:, None] - others).transpose(2, 0, 1))
+    return np.asarray((gaps > distance).all(1))
+
+
+def _trees(roads: RoadNetwork, style: Style, posts: Sequence[Prop], rng: np.random.Generator) -> Iterator[Prop]:
+    at, outward = _along(roads, TREE_LINE, style.tree_gap, rng)
+    heights, variants = rng.uniform(*style.tree_height, len(at)), rng.integers(3, size=len(at))
+    for i in np.flatnonzero(_clear(at, posts, CLEAR_OF_POSTS)):
+        pose = Pose(*map(float, at[i]), float(outward[i]) + math.pi)
+        yield Prop("tree", pose, 0.4, 0.4, float(heights[i]), int(variants[i]))
+
+
+def _furniture(roads: RoadNetwork, posts: Sequence[Prop], rng: np.random.Generator) -> Iterator[Prop]:
+    """Street lamps along the kerb; bins, benches, hydrants and boxes at the back of the sidewalk."""
+    for distance, gap, kinds in ((LAMP_LINE, (26, 34), ("lamp",)), (TREE_LINE, (14, 40), ("bin", "bench", "hydrant", "box"))):
+        at, outward = _along(roads, distance, gap, rng)
+        chosen = rng.integers(len(kinds), size=len(at))
+        for i in np.flatnonzero(_clear(at, posts, 2.5)):
+            pose = Pose(*map(float, at[i]), float(outward[i]) + math.pi)
+            yield Prop(kinds[chosen[i]], pose, *_SIZES[kinds[chosen[i]]], variant=int(rng.integers(4)))
 
 
 def _posts(roads: RoadNetwork) -> Iterator[Prop]:
     for post in roads.posts:
-        yield Prop("light_post", post.pose, 0.2, 0.2, 3.4)
+        yield Prop("light_post", post.pose, 0.2, 0.2, 3.5)
     for sign in roads.signs:
         yield Prop("sign_post", sign.pose, 0.2, 0.2, 2.5, label=sign.limit)
 
@@ -142,5 +215,8 @@ def _posts(roads: RoadNetwork) -> Iterator[Prop]:
 def build_scenery(roads: RoadNetwork) -> tuple[Prop, ...]:
     """All props of a town: posts first, then buildings, trees and furniture."""
     rng = np.random.default_rng(zlib.crc32(roads.name.encode()))
-    style = STYLES.get(roads.style, STYLES["town01"])
-    return (*_posts(roads), *_buildings(roads, style, rng))
+    style = STYLES[roads.style]
+    posts = tuple(_posts(roads))
+    buildings = tuple(_buildings(roads, style, rng))
+    trees = tuple(_trees(roads, style, posts, rng))
+    return (*posts, *buildings, *trees, *_furniture(roads, (*posts, *trees), rng))

@@ -40,7 +40,10 @@ class Surface:
         brush = ImageDraw.Draw(canvas)
         for polygon, value in polygons:
             for ring, color in ((polygon.exterior, value), *((hole, 0) for hole in polygon.interiors)):
-                brush.polygon([tuple(p) for p in (np.array(ring.coords) - self.origin) / CELL - 0.5], fill=color)
+                # The brush paints the cells that the border touches too: half a cell on each side.
+                inner = shapely.Polygon(ring).buffer(-CELL / 2, join_style="mitre").exterior
+                if not inner.is_empty:
+                    brush.polygon([tuple(p) for p in (np.array(inner.coords) - self.origin) / CELL - 0.5], fill=color)
         return np.array(canvas, dtype=np.int32)
 
     def shares(self, car: VehicleState, travel: float) -> tuple[float, float]:

@@ -103,8 +103,16 @@ def ambient(w: Weather) -> tuple[Color, Color]:
 def sky_colors(w: Weather) -> tuple[Color, Color]:
     """Colours of the sky straight up and at the horizon."""
     clouds = (w.cloudiness / 100) ** 0.9
-    zenith = _mix(_mix((0.25, 0.47, 0.82), (0.56, 0.59, 0.63), clouds), _mix((0.30, 0.36, 0.58), (0.40, 0.38, 0.42), clouds), w.sunset)
-    horizon = _mix(_mix((0.74, 0.84, 0.93), (0.76, 0.78, 0.80), clouds), _mix((0.98, 0.70, 0.42), (0.72, 0.60, 0.54), clouds), w.sunset)
+    zenith = _mix(
+        _mix((0.25, 0.47, 0.82), (0.56, 0.59, 0.63), clouds),
+        _mix((0.30, 0.36, 0.58), (0.40, 0.38, 0.42), clouds),
+        w.sunset,
+    )
+    horizon = _mix(
+        _mix((0.74, 0.84, 0.93), (0.76, 0.78, 0.80), clouds),
+        _mix((0.98, 0.70, 0.42), (0.72, 0.60, 0.54), clouds),
+        w.sunset,
+    )
     dim = 1 - 0.18 * w.precipitation / 100
     return zenith * dim, horizon * dim
 

@@ -1,0 +1,112 @@
+"""Buildings as meshes, all of a town at once: façades by style and variant, tiled hip roofs or flat ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.datatypes import Points
+from caldrive.geometry import box_corners
+from caldrive.world.meshes import RGB, Mesh, merge, quads
+from caldrive.world.scenery import STYLES, Prop
+from caldrive.world.textures import Tex
+
+BAY = 5.6  # m of façade in one layer: two bays upstairs, four half-width ones on the ground floor
+EAVES = 0.35
+FULL = 255  # vertices of walls look up shadows of buildings only, a little in front of themselves
+
+
+@dataclass(frozen=True)
+class Design:
+    """One type of building: layers of the upper floors and the ground floor, tints, and the roof's rise in metres."""
+
+    upper: Tex
+    ground: Tex
+    tint: RGB
+    base: RGB
+    roof: Tex
+    roof_tint: RGB
+    rise: float
+
+
+DESIGNS = {
+    "town01": (
+        Design(Tex.SASH, Tex.HALL, (244, 222, 170), (226, 214, 196), Tex.TILES, (196, 96, 70), 2.6),
+        Design(Tex.PANE, Tex.SHOP, (236, 190, 164), (240, 226, 214), Tex.TILES, (176, 84, 64), 2.2),
+        Design(Tex.BALCONY, Tex.SHOP, (240, 236, 226), (230, 226, 222), Tex.TILES, (150, 78, 62), 2.4),
+        Design(Tex.SASH, Tex.SHOP, (206, 218, 206), (226, 230, 222), Tex.TILES, (120, 92, 84), 2.8),
+        Design(Tex.PANE, Tex.HALL, (214, 168, 140), (206, 196, 184), Tex.TILES, (188, 92, 66), 3.0),
+        Design(Tex.BALCONY, Tex.HALL, (190, 206, 222), (218, 218, 218), Tex.TILES, (132, 76, 66), 2.2),
+    ),
+    "town02": (
+        Design(Tex.GLASS, Tex.LOBBY, (226, 240, 250), (236, 240, 244), Tex.PLAIN, (132, 134, 138), 0.0),
+        Design(Tex.BAND, Tex.LOBBY, (214, 212, 206), (232, 232, 232), Tex.PLAIN, (120, 120, 122), 0.0),
+        Design(Tex.LOFT, Tex.DOCK, (178, 104, 84), (206, 190, 180), Tex.PLAIN, (110, 100, 96), 0.0),
+        Design(Tex.BAND, Tex.DOCK, (160, 172, 178), (214, 214, 212), Tex.PLAIN, (96, 100, 104), 0.0),
+        Design(Tex.LOFT, Tex.LOBBY, (148, 128, 118), (214, 210, 206), Tex.PLAIN, (92, 90, 90), 0.0),
+        Design(Tex.GLASS, Tex.DOCK, (206, 216, 206), (200, 204, 200), Tex.PLAIN, (128, 130, 128), 0.0),
+    ),
+}
+
+
+def _walls(
+    corners: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64], layer: NDArray[np.int_],
+    tint: NDArray[np.int_], tiles_high: NDArray[np.float64],
+) -> Mesh:  # fmt: skip
+    """Four walls for each of N footprints (N, 4, 2), whole bays wide."""
+    following = np.roll(corners, -1, axis=1)
+    bays = np.maximum(1, np.rint(np.linalg.norm(following - corners, axis=2) / BAY * 2)) / 2
+    z0, z1 = (np.broadcast_to(z[:, None, None], (*corners.shape[:2], 1)) for z in (low, high))
+    faces = np.stack([np.concatenate(p, 2) for p in ((corners, z0), (following, z0), (following, z1), (corners, z1))], 2)
+    uv = np.zeros((*corners.shape[:2], 4, 3))
+    uv[..., 1:3, 0] = bays[..., None]
+    uv[..., 2:, 1] = tiles_high[:, None, None]
+    uv[..., 2] = layer[:, None, None]
+    return quads(faces.reshape(-1, 4, 3), np.repeat(tint, 4, axis=0), uv.reshape(-1, 4, 3), spare=FULL)
+
+
+def _roofs(corners: NDArray[np.float64], height: NDArray[np.float64], designs: Sequence[Design]) -> Mesh:
+    """Hip roofs with the ridge along the street; a rise of nothing makes a flat roof."""
+    rise = np.array([d.rise for d in designs])
+    middle = corners.mean(axis=1, keepdims=True)
+    out = middle + (corners - middle) * (1 + np.where(rise > 0, 2 * EAVES / 10, 0))[:, None, None]
+    ridge_left, ridge_right = (0.5 * (out[:, a] + out[:, b]) for a, b in ((0, 1), (2, 3)))  # over the two side walls
+    ridge = ridge_right - ridge_left
+    inset = np.minimum(0.35, 3.0 / np.maximum(np.linalg.norm(ridge, axis=1), 1))[:, None] * ridge
+    tops = [np.column_stack((p, height + rise)) for p in (ridge_left + inset, ridge_right - inset)]
+    eaves = np.concatenate((out, np.broadcast_to((height - 0.02)[:, None, None], (*out.shape[:2], 1))), axis=2)
+    a, b, c, d = (eaves[:, k] for k in range(4))
+    faces = np.stack(
+        [np.stack(f, 1) for f in ((b, c, tops[1], tops[0]), (d, a, tops[0], tops[1]), (a, b, tops[0], tops[0]), (c, d, tops[1], tops[1]))], 1
+    )  # fmt: skip
+    uv = np.zeros((len(corners), 4, 4, 3))
+    uv[..., 1:3, 0], uv[..., 2:, 1] = 3.0, 1.5
+    uv[..., 2] = np.array([d.roof for d in designs])[:, None, None]
+    tint = np.repeat(np.array([d.roof_tint for d in designs]), 4, axis=0)
+    return quads(faces.reshape(-1, 4, 3), tint, uv.reshape(-1, 4, 3), spare=FULL)
+
+
+def building_mesh(props: Sequence[Prop], style: str) -> Mesh:
+    """All buildings among the props as one mesh."""
+    houses = [p for p in props if p.kind == "building"]
+    if not houses:
+        return merge(())
+    designs = [DESIGNS[style][p.variant] for p in houses]
+    # counter-clockwise from front right, so that the walls look outwards
+    footprints: list[Points] = [np.roll(box_corners(p.pose, p.length, p.width), 1, axis=0) for p in houses]
+    corners, height = np.array(footprints), np.array([p.height for p in houses])
+    floor = STYLES[style].floor
+    low = np.full(len(houses), -0.06)
+    first = np.full(len(houses), floor)
+    return merge((
+        _walls(corners, low, first, *_looks(designs, "ground", "base"), np.ones(len(houses))),
+        _walls(corners, first, height, *_looks(designs, "upper", "tint"), (height - floor) / floor / 2),
+        _roofs(corners, height, designs),
+    ))  # fmt: skip
+
+
+def _looks(designs: Sequence[Design], layer: str, tint: str) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    return np.array([int(getattr(d, layer)) for d in designs]), np.array([getattr(d, tint) for d in designs])

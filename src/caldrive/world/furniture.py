@@ -1,0 +1,167 @@
+"""Trees, posts, signs and street furniture as meshes: one template for each kind and variant, copied to where it stands."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from caldrive.world.meshes import RGB, Mesh, box, disc, lathe, merge, packed, quads, smooth
+from caldrive.world.scenery import Prop
+from caldrive.world.textures import SIGN_LAYERS, Tex
+
+LAMPS = {"red": 3.16, "yellow": 2.82, "green": 2.48}  # m above the ground
+LAMP_RADIUS = 0.155
+LAMP_FACE = -0.2  # m ahead of the post's middle: the side that the traffic sees
+SIGN_HEIGHT, SIGN_RADIUS = 2.1, 0.45
+TREE_HEIGHT = 6.0  # m, of the templates
+_POLE: RGB = (132, 136, 140)
+_DARK: RGB = (34, 36, 38)
+
+
+@dataclass(frozen=True)
+class Detail:
+    """A template's parts: always drawn, only from near, only from afar."""
+
+    always: Mesh = merge(())
+    near: Mesh = merge(())
+    far: Mesh = merge(())
+
+
+def _pole(height: float, radius: float, color: RGB = _POLE, n: int = 5) -> Mesh:
+    return lathe(((radius, -0.05), (radius, height)), n, color)
+
+
+def _light_post() -> Detail:
+    """The mast, a black plate with a light rim, and three dark lenses; the camera adds the lit one."""
+    plate = box((0.0, 0, 2.82), (0.05, 0.66, 1.30), (226, 226, 222))
+    face = box((-0.04, 0, 2.82), (0.06, 0.58, 1.22), _DARK)
+    housing = box((-0.11, 0, 2.82), (0.16, 0.40, 1.08), (26, 27, 29))
+    dark = {"red": (74, 22, 22), "yellow": (76, 62, 20), "green": (20, 62, 34)}
+    lenses = [disc((LAMP_FACE - 0.005, 0, z), LAMP_RADIUS, 8, dark[name], -1) for name, z in LAMPS.items()]
+    return Detail(merge((_pole(2.3, 0.07, (86, 90, 94)), plate, face, housing)), merge(lenses))
+
+
+def _sign_post(limit: int) -> Detail:
+    front = disc((-0.07, 0, SIGN_HEIGHT), SIGN_RADIUS, 16, (255, 255, 255), -1, SIGN_LAYERS[limit])
+    back = disc((-0.05, 0, SIGN_HEIGHT), SIGN_RADIUS, 8, (118, 120, 122), 1)
+    return Detail(merge((_pole(2.5, 0.045), front, back)))
+
+
+def _uneven(mesh: Mesh, strength: float) -> Mesh:
+    """Dents in a crown; where two vertices meet they stay together."""
+    made = mesh.vertices.copy()
+    x, y, z = made["position"].T
+    made["position"][:, :2] *= (1 + strength * np.sin(3 * np.arctan2(y, x) + 2.3 * z) * np.hypot(x, y))[:, None]
+    return Mesh(made, mesh.triangles)
+
+
+def _crown(profile: Sequence[tuple[float, float]], color: RGB, layer: Tex, n: int, dents: float) -> Mesh:
+    middle = (profile[0][1] + profile[-1][1]) / 2
+    made = lathe(profile, n, color, layer=layer, spare=255, tile=2.6)
+    return smooth(_uneven(made, dents), (0, 0, middle - 0.4), 0.8)
+
+
+_CROWNS: dict[tuple[str, int], tuple[tuple[tuple[float, float], ...], RGB, Tex, RGB]] = {
+    ("town01", 0): (((0.3, 2.3), (1.5, 3.1), (1.75, 4.3), (1.1, 5.5), (0.0, 6.0)), (98, 142, 62), Tex.LEAVES, (104, 84, 66)),
+    ("town01", 1): (((0.4, 2.5), (1.2, 3.0), (1.55, 4.0), (1.2, 5.2), (0.0, 5.9)), (126, 158, 70), Tex.LEAVES, (112, 94, 76)),
+    ("town01", 2): (((0.2, 1.9), (0.75, 2.7), (0.95, 4.0), (0.6, 5.4), (0.0, 6.2)), (82, 126, 64), Tex.LEAVES, (96, 80, 64)),
+    ("town02", 0): (((0.2, 1.5), (1.35, 1.9), (0.95, 3.4), (0.5, 4.8), (0.0, 6.0)), (58, 98, 78), Tex.NEEDLES, (84, 66, 54)),
+    ("town02", 1): (((0.2, 1.2), (1.0, 1.7), (0.75, 3.4), (0.4, 5.0), (0.0, 6.2)), (70, 110, 80), Tex.NEEDLES, (84, 66, 54)),
+    ("town02", 2): (((0.3, 2.6), (1.2, 3.1), (1.4, 4.2), (0.9, 5.3), (0.0, 5.8)), (206, 142, 58), Tex.LEAVES, (196, 190, 180)),
+}  # fmt: skip
+
+
+def _tree(style: str, variant: int) -> Detail:
+    profile, color, layer, bark = _CROWNS[style, variant]
+    trunk = lathe(((0.17, -0.06), (0.12, profile[1][1])), 4, bark, spare=255)
+    dents = 0.10 if layer is Tex.LEAVES else 0.0
+    rough = (profile[0], profile[2] if layer is Tex.LEAVES else profile[1], profile[-1])
+    return Detail(trunk, _crown(profile, color, layer, 7, dents), _crown(rough, color, layer, 5, 0.0))
+
+
+def _lamp(style: str) -> Detail:
+    if style == "town02":
+        return Detail(merge((_pole(6.0, 0.07, (70, 74, 80), 4), box((0.9, 0, 6.0), (1.9, 0.22, 0.1), (70, 74, 80)))))
+    lantern = lathe(((0.09, 4.0), (0.24, 4.5), (0.0, 4.8)), 5, (52, 60, 54))
+    return Detail(merge((_pole(4.0, 0.06, (52, 60, 54), 4), lantern)))
+
+
+def _bench() -> Mesh:
+    seat = box((0, 0, 0.43), (0.45, 1.7, 0.06), (138, 96, 62))
+    back = box((-0.22, 0, 0.72), (0.05, 1.7, 0.3), (138, 96, 62))
+    legs = [box((0, y, 0.2), (0.4, 0.07, 0.4), (70, 70, 72)) for y in (-0.7, 0.7)]
+    return merge((seat, back, *legs))
+
+
+def _billboard(variant: int) -> Detail:
+    layer, frame = (Tex.POSTER_A, (70, 60, 50)) if variant % 2 else (Tex.POSTER_B, (60, 66, 70))
+    y, z0, z1 = 2.2, 1.5, 4.3
+    panel = [[(0.12, -y, z0), (0.12, y, z0), (0.12, y, z1), (0.12, -y, z1)]]
+    uv = [[(0, 0, layer), (1, 0, layer), (1, 1, layer), (0, 1, layer)]]
+    legs = [box((0, s * 1.5, 0.8), (0.15, 0.15, 1.7), frame) for s in (-1, 1)]
+    return Detail(merge((quads(panel, (255, 255, 255), uv), box((0, 0, 2.9), (0.2, 4.6, 3.0), frame), *legs)))
+
+
+def _template(kind: str, variant: int, label: int, style: str) -> Detail:
+    hues: tuple[RGB, ...] = ((168, 60, 48), (52, 92, 140), (214, 170, 62), (74, 124, 82))
+    hue = hues[variant % 4]
+    if kind == "light_post":
+        return _light_post()
+    if kind == "sign_post":
+        return _sign_post(label)
+    if kind == "tree":
+        return _tree(style, variant)
+    if kind == "lamp":
+        return _lamp(style)
+    if kind == "billboard":
+        return _billboard(variant)
+    if kind == "hedge":
+        return Detail(box((0, 0, 0.62), (0.9, 7.0, 1.36), (86, 122, 62), Tex.LEAVES, 2.0))
+    if kind == "fence":
+        return Detail(box((0, 0, 0.7), (0.08, 8.0, 1.5), (206, 196, 176) if style == "town01" else (120, 124, 128), Tex.BRICKS, 3.0))
+    if kind == "wall":
+        return Detail(box((0, 0, 0.95), (0.3, 8.0, 2.0), (176, 160, 150), Tex.BRICKS, 2.4))
+    if kind == "container":
+        return Detail(box((0, 0, 1.25), (2.4, 6.0, 2.6), hue, Tex.TILES, 2.0))
+    small = {
+        "bin": lambda: lathe(((0.2, 0.0), (0.23, 0.9), (0.0, 0.98)), 6, (66, 92, 72)),
+        "hydrant": lambda: lathe(((0.14, 0.0), (0.12, 0.6), (0.0, 0.75)), 6, (196, 44, 36)),
+        "box": lambda: box((0, 0, 0.6), (0.5, 0.9, 1.3), hue),
+        "bench": _bench,
+    }
+    return Detail(near=small[kind]())
+
+
+def copies(mesh: Mesh, props: Sequence[Prop], foot: float, scales: Sequence[float]) -> Mesh:
+    """A template copied to the poses of props and scaled, standing at a height."""
+    n, v = len(props), len(mesh.vertices)
+    heading = np.array([p.pose.heading for p in props])
+    c, s = np.cos(heading), np.sin(heading)
+    zero, one = np.zeros(n), np.ones(n)
+    turn = np.stack((np.stack((c, s, zero), 1), np.stack((-s, c, zero), 1), np.stack((zero, zero, one), 1)), 1)  # row vectors
+    made = np.tile(mesh.vertices, (n, 1))
+    at = np.array([(p.pose.x, p.pose.y, foot) for p in props])
+    made["position"] = np.asarray(scales)[:, None, None] * (made["position"] @ turn) + at[:, None]
+    made["normal"] = packed((made["normal"] - 128.0) / 127 @ turn)
+    triangles = mesh.triangles[None] + (v * np.arange(n, dtype=np.uint32))[:, None, None]
+    return Mesh(made.reshape(-1), triangles.reshape(-1, 3))
+
+
+def furniture_meshes(props: Sequence[Prop], style: str, foot: float) -> Detail:
+    """Everything but buildings, as three meshes: drawn always, from near, from afar. foot: height of the ground (m)."""
+    groups: defaultdict[tuple[str, int, int], list[Prop]] = defaultdict(list)
+    for prop in props:
+        if prop.kind != "building":
+            groups[prop.kind, prop.variant, prop.label].append(prop)
+    always, near, far = [], [], []
+    for (kind, variant, label), members in groups.items():
+        detail = _template(kind, variant, label, style)
+        scales = [p.height / TREE_HEIGHT if kind == "tree" else 1.0 for p in members]
+        for found, mesh in ((always, detail.always), (near, detail.near), (far, detail.far)):
+            if len(mesh.triangles):
+                found.append(copies(mesh, members, foot, scales))
+    return Detail(merge(always), merge(near), merge(far))

@@ -1,0 +1,77 @@
+"""Shadows of buildings and trees, as heights: a point is in the shade where it lies lower than the shadow above it.
+
+That is a picture of the town from above whose value is a height, so one look-up shades road, façades, cars and people.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from caldrive.geometry import box_corners
+from caldrive.world.scenery import Prop
+
+RESOLUTION = 0.5  # m of one pixel
+MARGIN = 30.0  # m around the roads
+TALLEST = 32.0  # m, the value of a full pixel
+
+Heights = NDArray[np.float32]
+
+
+def _drawn(props: Sequence[Prop], bounds: tuple[float, float, float, float], kind: str) -> Heights:
+    """Heights of the tops of all props of a kind, seen from above; row 0 at the lowest y."""
+    x0, y0, x1, y1 = bounds
+    size = (round((x1 - x0) / RESOLUTION), round((y1 - y0) / RESOLUTION))
+    picture = Image.new("F", size, 0.0)
+    draw = ImageDraw.Draw(picture)
+    for p in sorted((p for p in props if p.kind == kind), key=lambda p: p.height):
+        if kind == "tree":
+            r, x, y = 0.2 * p.height, p.pose.x, p.pose.y
+            draw.ellipse([((u - x0) / RESOLUTION, (v - y0) / RESOLUTION) for u, v in ((x - r, y - r), (x + r, y + r))], fill=0.8 * p.height)
+        else:
+            corners = (box_corners(p.pose, p.length, p.width) - (x0, y0)) / RESOLUTION
+            draw.polygon([(u, v) for u, v in corners.tolist()], fill=p.height + 1.2)
+    return np.asarray(picture)
+
+
+def _shifted(heights: Heights, columns: int, rows: int) -> Heights:
+    """The picture seen from a pixel that lies (columns, rows) away, 0 beyond the edges."""
+    moved = np.zeros_like(heights)
+    h, w = heights.shape
+    to_x, from_x = slice(max(0, -columns), min(w, w - columns)), slice(max(0, columns), min(w, w + columns))
+    to_y, from_y = slice(max(0, -rows), min(h, h - rows)), slice(max(0, rows), min(h, h + rows))
+    if abs(columns) < w and abs(rows) < h:
+        moved[to_y, to_x] = heights[from_y, from_x]
+    return moved
+
+
+def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
+    """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the way's fall."""
+    flat = float(np.hypot(sun[0], sun[1]))
+    fall, shade = float(sun[2]) / flat, heights.copy()
+    reach = float(heights.max()) / fall
+    step = RESOLUTION
+    while step < reach:
+        columns, rows = (round(step * float(s) / flat / RESOLUTION) for s in sun[:2])
+        np.maximum(shade, _shifted(shade, columns, rows) - np.float32(step * fall), out=shade)
+        step *= 2
+    return shade
+
+
+def town_bounds(roads_bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    """The rectangle that the shadow picture covers."""
+    x0, y0, x1, y1 = roads_bounds
+    return x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
+
+
+def shadow_heights(
+    props: Sequence[Prop], bounds: tuple[float, float, float, float], sun: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """Shadow heights (rows, columns, 2) in units of TALLEST / 255: of buildings with trees, of buildings alone."""
+    houses = cast(_drawn(props, bounds, "building"), sun)
+    trees = cast(_drawn(props, bounds, "tree"), sun)
+    both = np.stack((np.maximum(houses, trees), houses), axis=-1)
+    return np.asarray(np.clip(both / TALLEST * 255, 0, 255), dtype=np.uint8)

@@ -1,0 +1,53 @@
+"""Textures of surfaces: asphalt, paving, grass, leaves. Layers are (SIZE, SIZE, 3), bottom row first."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+SIZE = 128
+Layer = NDArray[np.uint8]
+RGB = tuple[int, int, int]
+
+
+def noise(rng: np.random.Generator, cells: int, size: int = SIZE) -> NDArray[np.float64]:
+    """Smooth noise (size, size) in [-1, 1] that repeats at its edges."""
+    grid = rng.uniform(-1, 1, (cells, cells))
+    at = np.arange(size) * cells / size
+    i, t = at.astype(int), at % 1
+    t = t * t * (3 - 2 * t)
+    rows = grid[i] * (1 - t)[:, None] + grid[(i + 1) % cells] * t[:, None]
+    return np.asarray(rows[:, i] * (1 - t) + rows[:, (i + 1) % cells] * t)
+
+
+def speckled(color: RGB, rng: np.random.Generator, fine: float, coarse: float, cells: int = 6) -> Layer:
+    wave = coarse * noise(rng, cells) + fine * rng.uniform(-1, 1, (SIZE, SIZE))
+    return np.clip(np.asarray(color) * (1 + wave[..., None]), 0, 255).astype(np.uint8)
+
+
+def asphalt(rng: np.random.Generator) -> Layer:
+    base = speckled((205, 205, 205), rng, 0.13, 0.10, 5).astype(float)
+    patches = noise(rng, 4) + 0.4 * noise(rng, 9)
+    base *= np.where(patches > 0.55, 0.86, 1.0)[..., None]
+    return base.astype(np.uint8)
+
+
+def paving(color: RGB, joint: float, rows: int, columns: int, rng: np.random.Generator) -> Layer:
+    """Stones in a running bond, each with its own shade."""
+    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
+    row = (y * rows).astype(int)
+    column = ((x * columns + 0.5 * (row % 2)) % columns).astype(int)
+    shade = 1 + 0.10 * rng.uniform(-1, 1, (rows, columns))[row, column] + 0.05 * rng.uniform(-1, 1, (SIZE, SIZE))
+    u, v = (x * columns + 0.5 * (row % 2)) % 1, (y * rows) % 1
+    edge = np.minimum(np.minimum(u, 1 - u) / columns, np.minimum(v, 1 - v) / rows) * SIZE < 0.9
+    return np.clip(np.asarray(color) * (shade * np.where(edge, joint, 1.0))[..., None], 0, 255).astype(np.uint8)
+
+
+def leaves(color: RGB, rng: np.random.Generator, cells: int) -> Layer:
+    wave = 0.30 * noise(rng, cells) + 0.22 * noise(rng, 2 * cells) + 0.10 * rng.uniform(-1, 1, (SIZE, SIZE))
+    return np.clip(np.asarray(color) * (1 + wave[..., None]), 0, 255).astype(np.uint8)
+
+
+def flipped(picture: Image.Image) -> Layer:
+    return np.asarray(picture)[::-1]

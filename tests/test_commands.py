@@ -1,0 +1,186 @@
+"""Every command, end to end and small."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from PIL import Image as Picture
+
+import caldrive
+from caldrive.cli import main
+from caldrive.config import BlockConfig, PerceptionConfig
+from caldrive.datatypes import Command, Observation
+from caldrive.driving.determinism import Run, compare
+from caldrive.driving.hud import SIZE
+
+DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]
+PREDICTED = ("hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance")
+
+
+def run_json(*arguments: str) -> dict[str, Any]:
+    """What a successful command prints with --json, which must be all that it prints."""
+    said = io.StringIO()
+    with redirect_stdout(said):
+        assert main([*arguments, "--json"]) == 0
+    found: dict[str, Any] = json.loads(said.getvalue())
+    return found
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A network that has learnt nothing."""
+    import torch
+
+    from caldrive.perception.checkpoint import CheckpointInfo, save_network
+    from caldrive.perception.network import Network
+
+    torch.manual_seed(0)
+    config = PerceptionConfig(64, 32, 0.0625, vehicle_distance=BlockConfig("gru", 8, 0.0, length=3))
+    path = tmp_path_factory.mktemp("model") / "random.safetensors"
+    save_network(path, Network(config), CheckpointInfo(config))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """Two seconds of each of two routes by the oracle: what is printed, and the folder."""
+    out = tmp_path_factory.mktemp("drive") / "results"
+    return run_json(*DRIVE, "--agent", "oracle", "--seconds", "2", "--episodes", "2", "--out", str(out)), out
+
+
+def test_drive_reports_each_episode(driven: tuple[dict[str, Any], Path]) -> None:
+    found, out = driven
+    assert [one["file"] for one in found["episodes"]] == [str(out / f"episode-00{k}.json") for k in range(2)]
+    for one in found["episodes"]:
+        assert one["outcome"] == "timeout"
+        assert one["duration"] == pytest.approx(2.0)
+        assert 0 < one["distance"] < 15
+        assert one["infractions"] == []
+    assert found["episodes"][0]["scenario"]["goal"] != found["episodes"][1]["scenario"]["goal"]
+
+
+def test_drive_writes_a_trace_of_every_step(driven: tuple[dict[str, Any], Path]) -> None:
+    found, out = driven
+    kept = json.loads((out / "episode-000.json").read_text())
+    trace = kept["trace"]
+    assert kept["result"] == {k: v for k, v in found["episodes"][0].items() if k != "file"}
+    assert trace["time"] == pytest.approx([0.1 * i for i in range(21)])
+    assert {len(column) for column in trace.values()} == {21}
+    assert [trace["x"][0], trace["y"][0]] == pytest.approx(
+        [kept["result"]["scenario"]["start"][k] for k in "xy"], abs=0.01
+    )
+    assert all(trace[f"predicted_{name}"] == trace[f"true_{name}"] for name in PREDICTED)
+
+
+def test_drive_films_all_episodes_in_one_video(driven: tuple[dict[str, Any], Path]) -> None:
+    found, out = driven
+    assert found["video"] == str(out / "drive.mp4")
+    with av.open(found["video"]) as film:
+        shapes = [(frame.width, frame.height) for frame in film.decode(video=0)]
+        assert film.streams.video[0].average_rate == 10
+    assert shapes == [SIZE] * (2 * (21 + 15))
+    assert sorted(p.name for p in out.iterdir()) == ["drive.mp4", "episode-000.json", "episode-001.json"]
+
+
+def test_strict_ends_with_1_where_a_goal_was_not_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [*DRIVE, "--agent", "oracle", "--seconds", "0.5", "--no-video", "--out", str(tmp_path), "--strict"]
+    assert main(arguments) == 1
+    shown = capsys.readouterr().out
+    assert "0 of 1 reached the goal" in shown
+    assert str(tmp_path) in shown
+    assert not (tmp_path / "drive.mp4").exists()
+
+
+def test_cal_drives_from_the_image_and_its_trace_tells_seen_from_true(model: str, tmp_path: Path) -> None:
+    run_json(*DRIVE, "--model", model, "--seconds", "0.5", "--no-video", "--out", str(tmp_path))
+    trace = json.loads((tmp_path / "episode-000.json").read_text())["trace"]
+    assert len(trace["time"]) == 6
+    assert trace["predicted_vehicle_distance"] != trace["true_vehicle_distance"]
+
+
+def test_an_image_that_tells_nothing_brakes_to_a_stand_and_says_why(model: str) -> None:
+    from caldrive.driving.drivers import network_agent
+
+    agent, camera = network_agent(Path(model), caldrive.ControlConfig())
+    agent.reset()
+    black = np.zeros((camera.height, camera.width, 3), np.uint8)
+    for speed in (8.0, 3.0, 0.0):
+        control = agent.act(Observation(0.0, black, speed, Command.STRAIGHT))
+        assert control.throttle == 0.0
+        assert control.brake >= 0.3
+        assert agent.decision is not None
+        assert "black" in agent.decision.note
+    agent.act(Observation(0.0, black + 90, 0.0, Command.STRAIGHT))
+    assert agent.decision.note == ""
+
+
+def test_speed_world_says_where_the_time_goes() -> None:
+    found = run_json("speed", "world", "--town", "town02", "--cars", "3", "--people", "5", "--steps", "10")
+    assert {"camera", "traffic (SUMO)", "pedestrians", "lights", "labels and truth", "rest"} <= found["parts_ms"].keys()
+    assert sum(found["parts_ms"].values()) == pytest.approx(found["median_ms"], rel=0.5)
+    assert found["steps_per_second"] > 0
+    assert found["first_frame"] > 0
+
+
+def test_speed_agent_gives_median_and_99th_percentile(model: str) -> None:
+    found = run_json("speed", "agent", "--model", model, "--steps", "20")
+    assert 0 < found["median_ms"] <= found["p99_ms"]
+    assert (found["width"], found["height"]) == (64, 32)
+
+
+def test_two_fresh_processes_drive_the_same_bytes() -> None:
+    found = run_json("determinism", "--agent", "oracle", "--town", "town02", "--seconds", "1")
+    assert found["equal"]
+    assert found["steps"] == 11
+
+
+def test_a_comparison_names_the_first_step_and_part_that_differ() -> None:
+    steps = tuple(("image", "truth", "decision", f"control{i}") for i in range(5))
+    other = (*steps[:3], ("image", "truth", "decision", "another"), steps[4])
+    assert compare(Run(steps, "r"), Run(steps, "r")).equal
+    assert compare(Run(steps, "r"), Run(other, "r")).difference == "step 3 (0.3 s) differs in its control"
+    assert compare(Run(steps, "r"), Run(steps[:4], "r")).difference == "one run ends after 4 steps, the other goes on"
+    assert compare(Run(steps, "r"), Run(steps, "q")).difference == "the results differ, though no step does"
+
+
+def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    different = compare(Run((("a",) * 4,), "r"), Run((("b",) * 4,), "r"))
+    monkeypatch.setattr("caldrive.driving.determinism.check_determinism", lambda *_: different)
+    assert main(["determinism"]) == 1
+    assert "step 0 (0.0 s) differs in its image" in capsys.readouterr().out
+
+
+def test_town_writes_its_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("caldrive.world.sheet")
+    module.contact_sheet = lambda town: np.full((40, 80, 3), len(town), np.uint8)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "caldrive.world.sheet", module)
+    found = run_json("town", "--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
+    assert (found["width"], found["height"]) == (160, 80)
+    assert Picture.open(found["sheet"]).size == (160, 80)
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["town.png"]
+
+
+def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom caldrive.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
+        "print('loaded', *{'torch', 'libsumo', 'moderngl', 'numpy', 'av'} & sys.modules.keys())"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert all(verb in shown for verb in ("drive", "town", "speed", "determinism"))
+    assert shown.splitlines()[-1].strip() == "loaded"
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(getattr(caldrive, name) is not None for name in caldrive.__all__)
+    with pytest.raises(AttributeError, match="caldrive has no 'Car'"):
+        caldrive.Car  # noqa: B018

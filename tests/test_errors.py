@@ -1,0 +1,97 @@
+"""What a person can do wrong ends in one sentence on stderr and exit code 2, and leaves nothing behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from caldrive.cli import main
+
+DRIVE = ["drive", "--agent", "oracle", "--seconds", "1"]
+MISTAKES = {
+    "unknown verb": (["fly"], "fly"),
+    "no verb": ([], "Expected one of"),
+    "unknown option": ([*DRIVE, "--wings", "2"], "--wings"),
+    "no number": ([*DRIVE, "--cars", "many"], "--cars"),
+    "unknown town": ([*DRIVE, "--town", "mars"], "town01, town02 or an OpenDRIVE file"),
+    "no such map": ([*DRIVE, "--town", "{tmp}/gone.xodr"], "check the path given to --town"),
+    "broken map": ([*DRIVE, "--town", "{tmp}/broken.xodr"], "give another .xodr file"),
+    "empty map": ([*DRIVE, "--town", "{tmp}/empty.xodr"], "give another .xodr file"),
+    "unknown weather": ([*DRIVE, "--weather", "15"], "wanted 1 to 14"),
+    "unknown task": ([*DRIVE, "--task", "swim"], "wanted one of straight"),
+    "unknown agent": ([*DRIVE, "--agent", "bob"], "wanted one of cal, oracle"),
+    "unknown preset": ([*DRIVE, "--preset", "wild"], "wanted one of default, paper"),
+    "too many cars": ([*DRIVE, "--cars", "9999"], "ask for fewer with --cars"),
+    "too many people": ([*DRIVE, "--people", "99999"], "ask for fewer with --people"),
+    "less than no car": ([*DRIVE, "--cars", "-1"], "type --cars 0"),
+    "no episode": ([*DRIVE, "--episodes", "0"], "type --episodes 1"),
+    "no such route": ([*DRIVE, "--route", "25"], "wanted 0 to 24"),
+    "negative seed": ([*DRIVE, "--seed", "-1"], "type --seed 0"),
+    "no time": ([*DRIVE, "--seconds", "nan"], "type --seconds 60"),
+    "a cap of nothing": ([*DRIVE, "--cap", "0"], "type --cap 20"),
+    "a file for a folder": ([*DRIVE, "--out", "{tmp}/broken.xodr/results"], "give another --out"),
+    "no such model": (["drive", "--model", "{tmp}/gone.safetensors"], "gone.safetensors"),
+    "corrupt model": (["drive", "--model", "{tmp}/corrupt.safetensors"], "corrupt.safetensors is damaged"),
+    "corrupt model, timed": (["speed", "agent", "--model", "{tmp}/corrupt.safetensors"], "is damaged"),
+    "no step to time": (["speed", "world", "--steps", "0"], "type --steps 600"),
+    "unknown town, timed": (["speed", "world", "--town", "mars"], "--town town01"),
+    "sheet of no kind": (["town", "--sheet", "{tmp}/town.jpg"], "wanted a name that ends in .png"),
+    "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384 pixels"),
+    "sheet in a folder's place": (["town", "--sheet", "{tmp}/folder.png"], "is a folder"),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with spoilt files, where nothing else may appear."""
+    (tmp_path / "broken.xodr").write_text("<OpenDRIVE><road")
+    (tmp_path / "empty.xodr").touch()
+    (tmp_path / "corrupt.safetensors").write_bytes(b"\x08\x00\x00\x00\x00\x00\x00\x00{broken}")
+    (tmp_path / "folder.png").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("CALDRIVE_TRACEBACK", raising=False)
+    return tmp_path
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_ends_in_one_sentence(mistake: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments, expected = MISTAKES[mistake]
+    before = sorted(folder.rglob("*"))
+    code = main([one.replace("{tmp}", str(folder)) for one in arguments])
+    said = capsys.readouterr()
+    assert (code, said.out) == (2, "")
+    assert said.err.startswith("caldrive: ")
+    assert said.err.count("\n") == 1
+    assert expected in said.err
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_cal_without_a_model_says_what_else_to_type(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from caldrive.driving import drivers
+
+    monkeypatch.setattr(drivers, "SHIPPED_MODEL", folder / "gone.safetensors")
+    assert main(["drive"]) == 2
+    said = capsys.readouterr().err
+    assert "--agent oracle" in said
+    assert "caldrive train" in said
+
+
+def test_a_full_disk_is_named_in_words(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device", "out/drive.mp4")
+
+    monkeypatch.setattr("caldrive.driving.drive.drive", fail)
+    assert main(DRIVE) == 2
+    assert capsys.readouterr().err == "caldrive: cannot use out/drive.mp4: no space left on device\n"
+
+
+def test_ctrl_c_ends_in_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("caldrive.driving.drive.drive", interrupt)
+    assert main(DRIVE) == 130
+    assert capsys.readouterr().err == "caldrive: stopped by Ctrl-C\n"
