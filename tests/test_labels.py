@@ -27,6 +27,7 @@ from caldrive.world.labels import label
 
 CAR = VehicleConfig()
 BUMPER = CAR.length / 2 - CAR.front_axle  # m from the front axle to the front bumper
+IN_LANE = Pose(-CAR.front_axle, 0.0, 0.0)  # the front axle at the origin
 STRAIGHT: Points = np.array([(-20.0, 0.0), (200.0, 0.0)])
 # Vertices of the table as (near, far, right, left) ahead of the front axle.
 A1, A2, A3 = (7.4, 14.0, -5.8, -0.8), (0.0, 8.2, -2.0, 2.0), (0.0, 50.0, -1.6, 1.6)
@@ -37,7 +38,7 @@ CM = 0.01
 class Scene:
     """Things by their places ahead of and left of the front axle of an ego at `pose`."""
 
-    pose: Pose = Pose(-CAR.front_axle, 0.0, 0.0)
+    pose: Pose = IN_LANE
     route: Points = field(default_factory=STRAIGHT.copy)
     vehicles: Sequence[VehicleState] = ()
     pedestrians: Sequence[PedestrianState] = ()
@@ -106,7 +107,9 @@ def test_yellow_counts_as_red_and_green_does_not(state: LightState, red: int) ->
     assert Scene(lights=[light(10, -3, state)]).label.red_light == red
 
 
-@pytest.mark.parametrize(("degrees", "counts"), [(0, True), (40, True), (-40, True), (50, False), (90, False), (180, False)])
+@pytest.mark.parametrize(
+    ("degrees", "counts"), [(0, True), (40, True), (-40, True), (50, False), (90, False), (180, False)]
+)
 def test_lights_and_signs_count_only_for_the_traffic_that_they_face(degrees: float, counts: bool) -> None:
     heading = math.radians(degrees)
     assert Scene(lights=[light(10, -3, heading=heading)]).label.red_light == float(counts)
@@ -138,7 +141,9 @@ def test_the_distance_to_a_slanted_car_runs_to_its_closest_corner() -> None:
 
 
 def test_the_closest_car_ahead_counts_and_touching_boxes_are_0_apart() -> None:
-    assert Scene(vehicles=[car(30, 0), car(15, 1), car(8, 3)]).label.vehicle_distance == pytest.approx(15 - 2.25 - BUMPER)
+    assert Scene(vehicles=[car(30, 0), car(15, 1), car(8, 3)]).label.vehicle_distance == pytest.approx(
+        15 - 2.25 - BUMPER
+    )
     assert Scene(vehicles=[car(2, 0)]).label.vehicle_distance == 0.0
 
 

@@ -48,7 +48,9 @@ def spells(phases: list[tuple[float, Phase, list[bool]]]) -> list[tuple[Phase, f
 
 
 @given(demands)
-def test_green_turns_yellow_then_red_and_only_then_is_another_green(wanted: list[tuple[list[bool], bool, float]]) -> None:
+def test_green_turns_yellow_then_red_and_only_then_is_another_green(
+    wanted: list[tuple[list[bool], bool, float]],
+) -> None:
     order = [phase.state for phase, _ in spells(run(wanted))]
     follow = {GREEN: AMBER, AMBER: RED, RED: GREEN}
     assert all(follow[a] is b for a, b in pairwise(order))
@@ -105,7 +107,8 @@ def test_green_is_cut_short_when_its_own_approach_is_empty() -> None:
 def test_an_occupied_junction_is_cleared_for_longer() -> None:
     waiting = [True, True, False]
     times = [
-        next(s for phase, s in spells(run([(waiting, occupied, 40)])) if phase.state is RED) for occupied in (False, True)
+        next(s for phase, s in spells(run([(waiting, occupied, 40)])) if phase.state is RED)
+        for occupied in (False, True)
     ]
     assert times == pytest.approx([SHORTEST_CLEARING, LONGEST_CLEARING], abs=2 * DT)
 

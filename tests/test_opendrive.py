@@ -88,9 +88,7 @@ def test_a_sign_follows_an_arc(tmp_path: Path) -> None:
 
 
 def test_a_sign_follows_a_spiral(tmp_path: Path) -> None:
-    spiral = (
-        '<geometry s="0" x="3" y="4" hdg="0.5" length="80"><spiral curvStart="0" curvEnd="-0.03"/></geometry>'
-    )
+    spiral = '<geometry s="0" x="3" y="4" hdg="0.5" length="80"><spiral curvStart="0" curvEnd="-0.03"/></geometry>'
     _, (sign,) = read_furniture(write_map(tmp_path, spiral, sign_at(60)))
     scale = math.sqrt(math.pi * 80 / 0.03)  # Euler's spiral: the Fresnel integrals give its points
     y, x = (scale * float(part) for part in fresnel(60 / scale))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from pathlib import Path
@@ -47,7 +48,7 @@ def test_limits_rise_by_30_at_most_and_every_stretch_ends_with_30(stretches: lis
     profile = limits(s + stretches[-1], bends)
     starts, values = zip(*profile, strict=True)
     assert list(starts) == sorted(set(starts))
-    assert all(after - before <= 30 for before, after in zip(values, values[1:], strict=False))
+    assert all(after - before <= 30 for before, after in itertools.pairwise(values))
     assert values[0] == values[-1] == 30
     for begin, _ in bends:
         assert [limit for start, limit in profile if start <= begin][-1] == 30

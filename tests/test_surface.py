@@ -44,7 +44,9 @@ def test_the_share_over_the_centre_line_is_that_of_the_area(
 
 
 @pytest.mark.parametrize(("left", "share"), [(-1.0, 0.0), (-2.0, 0.5), (-3.5, 1.0), (-3.0 - SIDEWALK_WIDTH, 0.0)])
-def test_the_share_beyond_the_kerb_is_that_of_the_area(left: float, share: float, surface: Surface, street: Lane) -> None:
+def test_the_share_beyond_the_kerb_is_that_of_the_area(
+    left: float, share: float, surface: Surface, street: Lane
+) -> None:
     here = street.line.pose_at(street.line.length / 2)
     assert shares(surface, moved(here, left=left), here.heading) == pytest.approx((0.0, share), abs=0.09)
 
@@ -59,7 +61,9 @@ def test_a_route_against_the_lane_makes_it_the_opposite_one(surface: Surface, st
     assert shares(surface, here, here.heading + math.pi)[0] == 1.0
 
 
-def test_a_slanted_car_is_on_the_sidewalk_with_its_corner_only(surface: Surface, street: Lane, town02: RoadNetwork) -> None:
+def test_a_slanted_car_is_on_the_sidewalk_with_its_corner_only(
+    surface: Surface, street: Lane, town02: RoadNetwork
+) -> None:
     here = moved(street.line.pose_at(street.line.length / 2), left=-0.8, turn=-0.6)
     box = shapely.Polygon(box_corners(here, 4.2, 1.8))
     true = box.intersection(town02.sidewalk).area / box.area

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -109,7 +110,7 @@ def test_cars_follow_the_centre_lines_of_their_lanes(usual: list[Moment], town02
 
 def test_a_car_moves_along_its_heading_at_its_speed(usual: list[Moment]) -> None:
     for path in paths(usual).values():
-        for before, after in zip(path, path[1:], strict=False):
+        for before, after in itertools.pairwise(path):
             ahead, left = to_local(before.pose, np.array([after.pose.x, after.pose.y]))
             assert ahead == pytest.approx((before.speed + after.speed) / 2 * DT, abs=0.35)
             assert abs(left) < 0.5
@@ -132,14 +133,19 @@ def test_no_two_cars_overlap(recording: str, request: pytest.FixtureRequest) -> 
 @pytest.mark.parametrize("recording", ["usual", "dense"])
 def test_cars_stop_at_red(recording: str, request: pytest.FixtureRequest) -> None:
     moments: list[Moment] = request.getfixturevalue(recording)
-    crossed = {state: 0 for state in LightState}
-    for before, after in zip(moments, moments[1:], strict=False):
+    crossed = dict.fromkeys(LightState, 0)
+    for before, after in itertools.pairwise(moments):
         places = {car.id: car for car in before.cars}
-        fronts = [(moved(places[c.id].pose, c.length / 2), moved(c.pose, c.length / 2)) for c in after.cars if c.id in places]
+        fronts = [
+            (moved(places[c.id].pose, c.length / 2), moved(c.pose, c.length / 2)) for c in after.cars if c.id in places
+        ]
         for light in before.lights:
             line = np.array(light.stop_line)
             for a, b in fronts:
-                if abs(a.x - line[0, 0]) + abs(a.y - line[0, 1]) < 10 and math.cos(a.heading - light.pose.heading) > 0.7:
+                if (
+                    abs(a.x - line[0, 0]) + abs(a.y - line[0, 1]) < 10
+                    and math.cos(a.heading - light.pose.heading) > 0.7
+                ):
                     crossed[light.state] += segments_cross(np.array([(a.x, a.y), (b.x, b.y)]), line)
     assert crossed[LightState.RED] == 0
     assert crossed[LightState.GREEN] > 5
@@ -153,7 +159,7 @@ def test_nobody_stands_for_ever_where_the_town_is_full(dense: list[Moment]) -> N
 
 def test_cars_drive_through_the_whole_town(dense: list[Moment], town01: RoadNetwork) -> None:
     ways = {
-        name: sum(math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in zip(path, path[1:], strict=False))
+        name: sum(math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in itertools.pairwise(path))
         for name, path in paths(dense).items()
     }
     assert min(ways.values()) > 20

@@ -85,9 +85,14 @@ def test_a_video_has_all_its_frames_at_their_size_and_rate(tmp_path: Path) -> No
 
 
 def test_an_interrupted_video_leaves_no_file(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), VideoWriter(tmp_path / "film.mp4") as video:
-        video.add(np.zeros((64, 96, 3), np.uint8))
-        raise KeyboardInterrupt
+    def film() -> None:
+        with VideoWriter(tmp_path / "film.mp4") as video:
+            video.add(np.zeros((64, 96, 3), np.uint8), times=100)
+            assert any(tmp_path.iterdir())
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film()
     assert list(tmp_path.iterdir()) == []
 
 

@@ -20,9 +20,11 @@ from tyro.conf import subcommand
 
 from caldrive.driving.settings import (
     AgentSpeedSettings,
+    CollectSettings,
     DeterminismSettings,
     DriveSettings,
     Progress,
+    TrainSettings,
     WorldSpeedSettings,
     silent,
 )
@@ -110,12 +112,46 @@ class Determinism(DeterminismSettings, Output):
         return Answer(asdict(found) | {"equal": found.equal}, said, int(not found.equal))
 
 
+@dataclass(frozen=True)
+class Collect(CollectSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.collection import CollectConfig, collect
+        from caldrive.driving.outputs import require_writable_folder
+        from caldrive.driving.tables import counts_table
+        from caldrive.perception.dataset import class_counts
+
+        require_writable_folder(self.out)
+        config = CollectConfig(self.town, self.weathers, self.episodes, self.duration, seed=self.seed)
+        for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
+            progress(f"recording, {done} done", done / self.episodes)
+        counts = class_counts(self.out)
+        return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
+
+
+@dataclass(frozen=True)
+class Train(TrainSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from dataclasses import replace
+
+        from caldrive.config import PERCEPTIONS, TRAININGS
+        from caldrive.perception.training import train
+
+        if self.preset not in TRAININGS:
+            raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
+        config = replace(TRAININGS[self.preset], seed=self.seed)
+        config = config if self.steps is None else replace(config, steps=self.steps)
+        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], progress=sys.stderr.isatty())
+        return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
+
+
 Speed = (
     Annotated[WorldSpeed, subcommand("world", description="Camera steps a second, and where the time goes.")]
     | Annotated[AgentSpeed, subcommand("agent", description="Milliseconds from image to control.")]
 )
 Command = (
     Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
+    | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
+    | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
     | Annotated[Town, subcommand("town", description="Draw a town on one page.")]
     | Annotated[Speed, subcommand("speed", description="Measure how fast the world or the agent is.")]
     | Annotated[
@@ -194,4 +230,4 @@ def _print(answer: Answer, as_json: bool) -> None:
         return
     from rich.console import Console
 
-    Console().print(answer.shown, highlight=False)
+    Console().print(answer.shown, highlight=False, soft_wrap=isinstance(answer.shown, str))

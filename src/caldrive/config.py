@@ -9,10 +9,10 @@ KMH = 1 / 3.6  # m/s in a km/h
 
 @dataclass(frozen=True)
 class CameraConfig:
-    """A pinhole camera on the ego: image size in pixels, horizontal field of view in degrees, mounting in the car's frame.
+    """A pinhole camera on the ego: image size in pixels, horizontal field of view in degrees, mounting.
 
-    forward, left, up: metres from the car's centre at ground level; yaw: rad, + left. The default is the authors' 800 x 600
-    camera with rows 120-480 kept, rendered straight at the network's size.
+    forward, left, up: metres from the car's centre at ground level; yaw: rad, + left. The default is the authors'
+    800 x 600 camera with rows 120-480 kept, rendered straight at the network's size.
     """
 
     width: int = 200

@@ -94,7 +94,7 @@ class Sign:
 
 @dataclass(frozen=True)
 class TrafficLight:
-    """A light on its post: foot of the post, heading of the traffic that it faces, state, and the ends of its stop line."""
+    """A light on its post: foot of the post, heading of the traffic it faces, state, and the ends of its stop line."""
 
     id: str
     pose: Pose

@@ -1,7 +1,7 @@
 """The recorder: oracle and controller drive a town, three cameras look on (section 3.1).
 
-Every episode depends on (seed, its number) only, so that a recording that was interrupted goes on and ends with the same
-files as an unbroken one.
+Every episode depends on (seed, its number) only, so that a recording that was interrupted goes on and ends with the
+same files as an unbroken one.
 """
 
 from __future__ import annotations

@@ -93,3 +93,39 @@ class AgentSpeedSettings:
     """How many images to measure."""
     threads: int | None = None
     """Threads for the network; without it as many as the machine has cores."""
+
+
+@dataclass(frozen=True)
+class CollectSettings:
+    """Record episodes that the oracle drives; what is there already is kept."""
+
+    out: Path = Path("out/recording")
+    """Folder for the episodes."""
+    town: str = "town01"
+    """town01 for training; town02 is for evaluation only."""
+    weathers: tuple[int, ...] = (1, 3, 6, 8)
+    """The weathers, in turn."""
+    episodes: int = 60
+    """How many episodes the folder holds in the end."""
+    duration: float = 40.0
+    """Simulated seconds of each."""
+    workers: int = 2
+    """Processes that record at the same time."""
+    seed: int = 0
+    """Decides everything random."""
+
+
+@dataclass(frozen=True)
+class TrainSettings:
+    """Train the small network on a recording; a run that was stopped goes on."""
+
+    data: Path = Path("out/recording")
+    """Folder with the recorded episodes."""
+    out: Path = Path("out/training")
+    """Folder for model.safetensors, the state of the run and its metrics."""
+    steps: int | None = None
+    """Steps of the optimizer, where the preset's are not wanted."""
+    preset: str = "small"
+    """small, for two cores, or paper."""
+    seed: int = 0
+    """Decides everything random."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group
@@ -58,3 +59,11 @@ def world_table(speed: WorldSpeed) -> Group:
     table.add_row("whole step", f"{speed.median_ms:.3f}", "", style="bold")
     first = f"first frame after {speed.first_frame:.2f} s, and {speed.imports:.2f} s to load the libraries before it"
     return Group(table, Text(f"{speed.steps_per_second:.0f} camera steps a second"), Text(first))
+
+
+def counts_table(folder: Path, counts: dict[str, dict[str, int]]) -> Group:
+    """How many frames of a recording carry which label."""
+    table = Table("label", "frames", box=SIMPLE_HEAD)
+    for name, values in counts.items():
+        table.add_row(name.replace("_", " "), ", ".join(f"{value}: {n}" for value, n in values.items()))
+    return Group(table, Text(f"recorded: {folder}; train on it: caldrive train --data {folder}"))

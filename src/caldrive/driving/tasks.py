@@ -1,7 +1,7 @@
 """The four tasks of the benchmark (section 4): going straight, one turn, navigation, navigation among others.
 
-The package's towns have 25 fixed routes for each task; `python -m caldrive.driving.tasks` draws them anew. Other maps get
-random ones.
+The package's towns have 25 fixed routes for each task; `python -m caldrive.driving.tasks` draws them anew. Other maps
+get random ones.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ def draw_routes(roads: RoadNetwork, task: str, n: int, rng: np.random.Generator)
             found.append((start, goal))
             if len(found) == n:
                 return found
-    raise ValueError(f"found {len(found)} routes for {task} in {roads.name}, wanted {n}: the map is too small for this task")
+    raise ValueError(
+        f"found {len(found)} routes for {task} in {roads.name}, wanted {n}: the map is too small for this task"
+    )
 
 
 @lru_cache(maxsize=1)
@@ -92,6 +94,8 @@ def scenarios(
     cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02).
     time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s.
     """
+    if time_limit not in ("paper", "code"):
+        raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: give time_limit='paper'")
     usual = USUAL_TRAFFIC.get(town, (20, 50)) if task == "navigation-dynamic" else (0, 0)
     n_cars, n_people = usual[0] if cars is None else cars, usual[1] if people is None else people
     found = []

@@ -45,6 +45,17 @@ def find_episodes(folder: Path | str) -> list[Episode]:
     return [read_episode(path) for path in paths]
 
 
+def class_counts(folder: Path | str) -> dict[str, dict[str, int]]:
+    """How many frames of a recording have each value of the discrete affordances and of the command."""
+    columns = [episode.columns for episode in find_episodes(folder)]
+    names = [*(s.name for s in SPECS if s.discrete), "command"]
+    found = {}
+    for name in names:
+        values, counts = np.unique(np.concatenate([c[name] for c in columns]), return_counts=True)
+        found[name] = {str(v.item()): int(n) for v, n in zip(values, counts, strict=True)}
+    return found
+
+
 def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
     """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for
     each."""

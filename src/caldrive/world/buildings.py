@@ -72,7 +72,7 @@ def _roofs(corners: NDArray[np.float64], height: NDArray[np.float64], designs: S
     """Hip roofs with the ridge along the street; a rise of nothing makes a flat roof."""
     rise = np.array([d.rise for d in designs])
     middle = corners.mean(axis=1, keepdims=True)
-    out = middle + (corners - middle) * (1 + np.where(rise > 0, 2 * EAVES / 10, 0))[:, None, None]
+    out = middle + (corners - middle) * (1 + 2 * EAVES / 10)
     ridge_left, ridge_right = (0.5 * (out[:, a] + out[:, b]) for a, b in ((0, 1), (2, 3)))  # over the two side walls
     ridge = ridge_right - ridge_left
     inset = np.minimum(0.35, 3.0 / np.maximum(np.linalg.norm(ridge, axis=1), 1))[:, None] * ridge
@@ -87,6 +87,15 @@ def _roofs(corners: NDArray[np.float64], height: NDArray[np.float64], designs: S
     uv[..., 2] = np.array([d.roof for d in designs])[:, None, None]
     tint = np.repeat(np.array([d.roof_tint for d in designs]), 4, axis=0)
     return quads(faces.reshape(-1, 4, 3), tint, uv.reshape(-1, 4, 3), spare=FULL)
+
+
+def _eaves(corners: NDArray[np.float64], height: NDArray[np.float64], designs: Sequence[Design]) -> Mesh:
+    """The roof's edge: a band around the top of each building, in the roof's colour where it is tiled."""
+    middle = corners.mean(axis=1, keepdims=True)
+    out = middle + (corners - middle) * (1 + 2 * EAVES / 10)
+    tint = np.array([d.roof_tint if d.rise > 0 else d.base for d in designs]) * 0.8
+    plain = np.full(len(corners), int(Tex.PLAIN))
+    return _walls(out, height - 0.3, height + 0.02, plain, tint.astype(int), np.ones(len(corners)))
 
 
 def building_mesh(props: Sequence[Prop], style: str) -> Mesh:
@@ -105,6 +114,7 @@ def building_mesh(props: Sequence[Prop], style: str) -> Mesh:
         _walls(corners, low, first, *_looks(designs, "ground", "base"), np.ones(len(houses))),
         _walls(corners, first, height, *_looks(designs, "upper", "tint"), (height - floor) / floor / 2),
         _roofs(corners, height, designs),
+        _eaves(corners, height, designs),
     ))  # fmt: skip
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
+import zlib
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -12,119 +11,194 @@ from numpy.typing import NDArray
 
 from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
-from caldrive.geometry import moved
-from caldrive.world import shaders
-from caldrive.world.ground import ground_mesh, road_mesh, yard_mesh
-from caldrive.world.meshes import Mesh, box, merge, turned
+from caldrive.world import actors
+from caldrive.world.batches import Crowd, TownBatch, vertex_array
+from caldrive.world.buildings import building_mesh
+from caldrive.world.cars import SHAPES, car_mesh, far_car_mesh
+from caldrive.world.furniture import LAMP_FACE, LAMPS, furniture_meshes
+from caldrive.world.gl import Target, gl_context, programs, smooth_texture
+from caldrive.world.ground import KERB_HEIGHT, ground_mesh, road_mesh, yard_mesh
+from caldrive.world.optics import Lens, mounted
+from caldrive.world.people import far_person_mesh, person_mesh
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import Prop
-from caldrive.world.weather import look, weather
+from caldrive.world.shadows import shadow_heights, town_bounds
+from caldrive.world.sky import dome_mesh, panorama
+from caldrive.world.tiles import FAR as TOWN_FAR
+from caldrive.world.tiles import DETAIL, Level, Tiles, View
+from caldrive.world.weather import Look, look, weather
 
-NEAR, FAR = 0.25, 900.0
-
-
-@lru_cache(maxsize=1)
-def gl_context() -> moderngl.Context:
-    """The process's one OpenGL context. Raises RuntimeError where the machine has no EGL."""
-    try:
-        return moderngl.create_standalone_context(require=330, backend="egl")
-    except Exception as error:
-        raise RuntimeError(
-            f"found no EGL with OpenGL 3.3 ({error}): type apt-get install libegl1 libgl1-mesa-dri"
-        ) from error
-
-
-def view_projection(eye: tuple[float, float, float], heading: float, pitch: float, fov: float, aspect: float) -> NDArray[np.float64]:
-    """World to clip space (4, 4) for a pinhole camera; fov: horizontal, degrees; pitch: rad, + up."""
-    c, s, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
-    forward, right = np.array([c * cp, s * cp, sp]), np.array([s, -c, 0.0])
-    up = np.cross(right, forward)
-    f = 1 / math.tan(math.radians(fov) / 2)
-    depth = np.array([(FAR + NEAR) / (FAR - NEAR), -2 * FAR * NEAR / (FAR - NEAR)])
-    rows = np.stack((f * right, f * aspect * up, depth[0] * forward, forward))
-    offset = np.array([0, 0, depth[1], 0])
-    return np.column_stack((rows, offset - rows @ np.asarray(eye)))
+GLOW_FAR = 150.0  # m
+GLOWS = {LightState.RED: (1.0, 0.10, 0.06), LightState.YELLOW: (1.0, 0.74, 0.10), LightState.GREEN: (0.12, 1.0, 0.42)}
+SUN_AZIMUTH = {"town01": 0.95, "town02": 2.5}  # rad
+PAINT = {  # colours of centre lines, edge lines and asphalt, and the widths that the road shader wants
+    "town01": ((0.93, 0.70, 0.20), (0.92, 0.92, 0.90), (0.50, 0.50, 0.51), (0.10, 0.075, 0.28, 0.5)),
+    "town02": ((0.95, 0.82, 0.42), (0.88, 0.88, 0.86), (0.58, 0.56, 0.54), (0.09, 0.06, 0.18, 0.42)),
+}
+Indices = NDArray[np.int_]
 
 
 class Camera:
-    """Draws one town. lights: keyed by LightPost.id."""
+    """Draws one town."""
 
     def __init__(self, roads: RoadNetwork, scenery: tuple[Prop, ...]) -> None:
-        self.roads = roads
-        self.context = gl_context()
-        things = [turned(box((0, 0, p.height / 2), (p.length, p.width, p.height), (170, 140, 120)), p.pose) for p in scenery]
-        mesh = merge((road_mesh(roads), ground_mesh(roads), yard_mesh(roads), *things))
-        self._program = self.context.program(shaders.STATIC_VERTEX, shaders.STATIC_FRAGMENT)
-        self._frame = self.context.buffer(reserve=80)
-        self._look = self.context.buffer(reserve=112)
-        for name, binding in (("Frame", 0), ("Look", 1)):
-            self._program[name].binding = binding
-        self._static = self._array(mesh)
-        self._cube = box((0, 0, 0.5), (1, 1, 1), (60, 80, 170))
-        self._targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
-
-    def _array(self, mesh: Mesh) -> moderngl.VertexArray:
-        data = self.context.buffer(np.ascontiguousarray(mesh.vertices).tobytes())
-        index = self.context.buffer(mesh.triangles.astype("u4").tobytes())
-        return self.context.vertex_array(
-            self._program, [(data, "3f 3x4 4f1 4f1", "position", "normal", "color")], index_buffer=index, index_element_size=4
+        gl, made = gl_context(), programs()
+        self.roads, self.scenery, self.azimuth = roads, scenery, SUN_AZIMUTH[roads.style]
+        details = furniture_meshes(scenery, roads.style, KERB_HEIGHT)
+        standing = [
+            (building_mesh(scenery, roads.style), Level.ALWAYS), (ground_mesh(roads), Level.ALWAYS), (details.always, Level.ALWAYS),
+            (details.near, Level.NEAR), (details.far, Level.FAR), (yard_mesh(roads), Level.ALWAYS),
+        ]  # fmt: skip
+        self._static = TownBatch(Tiles(standing), made.static, ("position", "uv", "normal", "color"))
+        self._road = TownBatch(Tiles([(road_mesh(roads), Level.ALWAYS)]), made.road, ("position", "uv", "color"))
+        self._cars = [(Crowd(car_mesh(s)), Crowd(far_car_mesh(s))) for s in SHAPES]
+        self._people = Crowd(person_mesh()), Crowd(far_person_mesh())
+        dome = dome_mesh()
+        self._dome = vertex_array(
+            made.sky, gl.buffer(dome.vertices.tobytes()), ("position", "uv"), gl.buffer(dome.triangles.tobytes())
         )
-
-    def _target(self, width: int, height: int) -> moderngl.Framebuffer:
-        if (width, height) not in self._targets:
-            self._targets[width, height] = self.context.framebuffer(
-                self.context.renderbuffer((width, height), 4), self.context.depth_renderbuffer((width, height))
-            )
-        return self._targets[width, height]
+        self._thrown, self._lamps = (gl.buffer(reserve=32 * 1024, dynamic=True) for _ in range(2))
+        self._shadow_array = gl.vertex_array(
+            made.shadow, [(made.corners, "2f", "corner"), (self._thrown, "4f 4f/i", "stands", "extent")]
+        )
+        self._glow_array = gl.vertex_array(made.glow, [(made.corners, "2f", "corner"), (self._lamps, "4f 4f/i", "lamp", "tint")])
+        self._rain_array = gl.vertex_array(made.rain, [(made.corners, "2f", "corner")])
+        at = [(p.pose.x, p.pose.y, p.pose.heading) for p in roads.posts]
+        self._posts = np.array(at).reshape(-1, 3)
+        self._targets: dict[tuple[int, int], Target] = {}
+        self._skies: dict[int, moderngl.Texture] = {}
+        self._shadows: dict[float, moderngl.Texture] = {}
 
     def render(
-        self, weather_id: int, ego: VehicleState, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState],
+        self, weather: int, ego: VehicleState, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState],
         lights: Mapping[str, LightState], mounts: Sequence[CameraConfig], time: float,
     ) -> list[Image]:  # fmt: skip
-        """One picture (H, W, 3) for each mount on the ego."""
-        cars = [turned(box((0, 0, 0.75), (v.length, v.width, 1.5), (40, 60, 160)), v.pose) for v in vehicles]
-        people = [turned(box((0, 0, 0.85), (0.35, 0.5, 1.7), (190, 90, 60)), p.pose) for p in pedestrians]
-        moving = merge((*cars, *people))
-        dynamic = self._array(moving) if len(moving.triangles) else None
-        images = []
-        for m in mounts:
-            pose = moved(ego.pose, m.forward, m.left, m.yaw)
-            images.append(self._draw(weather_id, pose, m.up, 0.0, m.fov, (m.width, m.height), dynamic))
-        if dynamic is not None:
-            dynamic.release()
-        return images
-
-    def _draw(
-        self, weather_id: int, pose: Pose, up: float, pitch: float, fov: float, size: tuple[int, int],
-        dynamic: moderngl.VertexArray | None,
-    ) -> Image:  # fmt: skip
-        sky = look(weather(weather_id), 0.9)
-        target = self._target(*size)
-        eye = (pose.x, pose.y, up)
-        matrix = view_projection(eye, pose.heading, pitch, fov, size[0] / size[1])
-        self._frame.write(np.concatenate((matrix.T.ravel(), eye, [0])).astype("f4").tobytes())
-        rows = [(*sky.sun_direction, 0), (*sky.sun, 0), (*sky.sky_ambient, 0), (*sky.ground_ambient, 0),
-                (*sky.horizon, sky.fog_density), (*sky.zenith, 0), (sky.wetness, sky.puddles, sky.rain, 0)]  # fmt: skip
-        self._look.write(np.array(rows, dtype="f4").tobytes())
-        self._frame.bind_to_uniform_block(0)
-        self._look.bind_to_uniform_block(1)
-        target.use()
-        self.context.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        target.clear(*(0.5 * (sky.horizon + sky.zenith)), 1.0)
-        self._static.render()
-        if dynamic is not None:
-            dynamic.render()
-        pixels = np.frombuffer(target.read(components=3), np.uint8).reshape(size[1], size[0], 3)
-        return np.ascontiguousarray(pixels[::-1])
+        """One picture (H, W, 3) for each mount on the ego. lights: by LightPost.id. Raises ValueError for an unknown weather."""
+        lenses = [mounted(ego, mount) for mount in mounts]
+        return self.render_through(lenses, weather, vehicles, pedestrians, lights, time)
 
     def render_from(
-        self, weather_id: int, pose: Pose, height: float, pitch: float = 0.0, fov: float = 90.0, size: tuple[int, int] = (960, 432)
-    ) -> Image:
-        """A picture from a free camera; height in metres, pitch in rad, + up."""
-        return self._draw(weather_id, pose, height, pitch, fov, size, None)
+        self, weather: int, pose: Pose, height: float, pitch: float = 0.0, fov: float = 90.0,
+        size: tuple[int, int] = (960, 432), vehicles: Sequence[VehicleState] = (),
+        pedestrians: Sequence[PedestrianState] = (), lights: Mapping[str, LightState] | None = None, time: float = 0.0,
+    ) -> Image:  # fmt: skip
+        """A picture from anywhere: height in m, pitch in rad (+ up), fov in degrees, size in pixels."""
+        return self.render_through([Lens(pose, height, pitch, fov, size)], weather, vehicles, pedestrians, lights or {}, time)[0]
+
+    def render_through(
+        self, lenses: Sequence[Lens], weather: int, vehicles: Sequence[VehicleState],
+        pedestrians: Sequence[PedestrianState], lights: Mapping[str, LightState], time: float,
+    ) -> list[Image]:  # fmt: skip
+        """One picture (H, W, 3) for each lens."""
+        sky = self._enter(weather)
+        cars, shapes = actors.car_instances(vehicles)
+        people = actors.person_instances(pedestrians)
+        images = []
+        for lens in lenses:
+            target = self._open(lens, time)
+            view = lens.view()
+            self._draw_actors(view, lens, cars, shapes, people)
+            self._draw_town(lens, view)
+            self._draw_shadows(view, cars, shapes, people)
+            self._draw_lamps(view, lights, sky.wetness > 0)
+            if sky.rain > 0:
+                gl_context().disable(moderngl.DEPTH_TEST)
+                gl_context().blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+                self._rain_array.render(moderngl.TRIANGLE_STRIP)
+            images.append(target.read())
+        return images
+
+    def _enter(self, id: int) -> Look:
+        """Makes a weather's sky, light and shadows the current ones."""
+        w = weather(id)
+        sky = look(w, self.azimuth)
+        if w.sun_altitude not in self._shadows:
+            heights = shadow_heights(self.scenery, town_bounds(self.roads.bounds), sky.sun_direction)
+            self._shadows[w.sun_altitude] = smooth_texture(heights)
+        if id not in self._skies:
+            self._skies[id] = smooth_texture(panorama(w, sky, zlib.crc32(self.roads.name.encode())), wraps=True)
+        made = programs()
+        made.look.write(self._look_block(sky))
+        made.look.bind_to_uniform_block(1)
+        for unit, texture in enumerate((made.layers, self._shadows[w.sun_altitude], self._skies[id], made.drops)):
+            texture.use(unit)
+        for name, value in zip(("center_color", "edge_color", "asphalt", "widths"), PAINT[self.roads.style], strict=True):
+            made.road[name] = value
+        return sky
+
+    def _look_block(self, sky: Look) -> bytes:
+        x0, y0, x1, y1 = town_bounds(self.roads.bounds)
+        rows = [
+            (*sky.sun_direction, 0), (*sky.sun, 0), (*sky.sky_ambient, 0), (*sky.ground_ambient, 0), (*sky.horizon, sky.fog_density),
+            (*sky.zenith, 0), (sky.wetness, sky.puddles, sky.rain, 0), (x0, y0, 1 / (x1 - x0), 1 / (y1 - y0)),
+        ]  # fmt: skip
+        return np.array(rows, dtype="f4").tobytes()
+
+    def _open(self, lens: Lens, time: float) -> Target:
+        if lens.size not in self._targets:
+            self._targets[lens.size] = Target(*lens.size)
+        target, gl, made = self._targets[lens.size], gl_context(), programs()
+        target.drawn.use()
+        gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        gl.front_face, gl.depth_func = "cw", "<="
+        target.drawn.clear(0.5, 0.5, 0.5, 1.0)
+        eye = (lens.pose.x, lens.pose.y, lens.height, time % 64.0)
+        block = np.concatenate((lens.matrix().T.ravel(), eye, (*lens.size, lens.focal, (time * 7.3) % 1.0)))
+        made.frame.write(block.astype("f4").tobytes())
+        made.frame.bind_to_uniform_block(0)
+        return target
+
+    def _draw_actors(self, view: View, lens: Lens, cars: actors.Instances, shapes: Indices, people: actors.Instances) -> None:
+        sharp = lens.focal / 100
+        seen, distance = actors.in_view(cars, view, actors.CAR_FAR * max(1.0, sharp))
+        near = distance < actors.CAR_DETAIL * sharp
+        for k in set(shapes[seen].tolist()):
+            fine, coarse = self._cars[k]
+            fine.draw(cars[seen & near & (shapes == k)])
+            coarse.draw(cars[seen & ~near & (shapes == k)])
+        seen, distance = actors.in_view(people, view, actors.PERSON_FAR * max(1.0, sharp))
+        near = distance < actors.PERSON_DETAIL * sharp
+        self._people[0].draw(people[seen & near])
+        self._people[1].draw(people[seen & ~near])
+
+    def _draw_town(self, lens: Lens, view: View) -> None:
+        self._road.draw(view, DETAIL, TOWN_FAR)
+        self._static.draw(view, DETAIL * max(1.0, lens.focal / 160), TOWN_FAR)
+        gl_context().disable(moderngl.CULL_FACE)
+        self._dome.render()
+
+    def _draw_shadows(self, view: View, cars: actors.Instances, shapes: Indices, people: actors.Instances) -> None:
+        gl = gl_context()
+        gl.enable(moderngl.BLEND)
+        gl.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        thrown = np.concatenate((actors.car_shadows(cars, shapes), actors.person_shadows(people)))
+        thrown = thrown[view.sees(thrown[:, :2], 6.0)][:1024]
+        if len(thrown):
+            self._thrown.write(thrown.astype("f4").tobytes())
+            self._shadow_array.render(moderngl.TRIANGLE_STRIP, instances=len(thrown))
+
+    def _draw_lamps(self, view: View, lights: Mapping[str, LightState], wet: bool) -> None:
+        """The lit lamps, and on a wet road their streaks."""
+        seen = view.sees(self._posts[:, :2], 1.0) & (np.hypot(*(self._posts[:, :2] - view.eye).T) < GLOW_FAR)
+        rows = []
+        for k in np.flatnonzero(seen):
+            state = lights.get(self.roads.posts[k].id)
+            if state is not None:
+                x, y, heading = self._posts[k]
+                face = (LAMP_FACE - 0.03) * np.array((np.cos(heading), np.sin(heading)))
+                row = (x + face[0], y + face[1], LAMPS[state.value] + KERB_HEIGHT, heading, *GLOWS[state])
+                rows += [(*row, 0.0), (*row, 1.0)] if wet else [(*row, 0.0)]
+        if rows:
+            gl_context().blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+            self._lamps.write(np.array(rows[:1024], dtype="f4").tobytes())
+            self._glow_array.render(moderngl.TRIANGLE_STRIP, instances=len(rows))
 
     def close(self) -> None:
-        for target in self._targets.values():
-            target.release()
+        """Frees what the town holds on the graphics side."""
+        for batch in (self._static, self._road):
+            batch.release()
+        for thing in (*self._targets.values(), *self._skies.values(), *self._shadows.values()):
+            thing.release()
         self._targets.clear()
-        self._static.release()
+        self._skies.clear()
+        self._shadows.clear()

@@ -1,6 +1,6 @@
 """Cars as low-poly meshes, lofted from cross-sections; length and width are scaled to the real ones when drawn.
 
-Slots: 0 takes the vertex colour, 1 the paint, 2 and 3 the colours of tail and head lamps.
+Slots: 0 takes the vertex colour, 1 the paint, 2 and 3 the colours of tail and head lamps, 5 is glass in the vertex colour.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from caldrive.world.meshes import RGB, Mesh, box, disc, merge, quads
 
-PAINT, TAIL, HEAD = 1, 2, 3
+PAINT, TAIL, HEAD, GLASS = 1, 2, 3, 5
 GLOWING = 8  # in the spare byte: lit by nothing but itself
 LENGTH, WIDTH = 4.4, 1.8  # m, of the meshes
 _GLASS: RGB = (38, 46, 56)
@@ -59,8 +59,8 @@ def _panels(shape: Shape) -> list[Mesh]:
             lower += [f[:: -y] for f in (side, bevel)]
             upper.append(window[:: -y])
         top = [[(x0, -w0, r0), (x0, w0, r0), (x1, w1, r1), (x1, -w1, r1)]]
-        parts += [quads(lower, (255, 255, 255), slot=PAINT), quads(upper, _GLASS)]
-        parts.append(quads(top, _GLASS) if sloped else quads(top, (255, 255, 255), slot=PAINT))
+        parts += [quads(lower, (255, 255, 255), slot=PAINT), quads(upper, _GLASS, slot=GLASS)]
+        parts.append(quads(top, _GLASS, slot=GLASS) if sloped else quads(top, (255, 255, 255), slot=PAINT))
     for (x, s, r), facing in ((shape.sections[0], 1), (shape.sections[-1], -1)):
         w = half * 0.94
         end = [(x, -w, _SILL), (x, w, _SILL), (x, w, max(s, r)), (x, -w, max(s, r))]

@@ -35,7 +35,7 @@ def obstacle_of(thing: VehicleState | PedestrianState) -> Obstacle:
 
 def _at_fault(ego: VehicleState, touch: Points, other: Obstacle) -> bool:
     """The ego is at fault where its moving front or flank runs into something, not where it is run into."""
-    x, y = to_local(ego.pose, touch)
+    x = float(to_local(ego.pose, touch)[0])
     if ego.speed < 0.3 or x < 0:
         return other.kind is ContactKind.OBJECT
     if other.kind is ContactKind.PERSON:
@@ -54,13 +54,15 @@ def _impulse(ego: VehicleState, other: Obstacle, normal: Points) -> float:
 
 
 def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleState, tuple[Contact, ...]]:
-    """The ego pushed out of what it overlaps and slowed (from behind: sped up) by it, and the contacts. A glancing hit slides along."""
+    """The ego pushed out of what it overlaps and slowed (from behind: sped up) by it; a glancing hit slides along."""
     contacts = []
     for other in obstacles:
         reach = math.hypot(ego.length + other.length, ego.width + other.width) / 2
         if math.hypot(other.pose.x - ego.pose.x, other.pose.y - ego.pose.y) > reach:
             continue
-        shift = push_out(box_corners(ego.pose, ego.length, ego.width), box_corners(other.pose, other.length, other.width))
+        shift = push_out(
+            box_corners(ego.pose, ego.length, ego.width), box_corners(other.pose, other.length, other.width)
+        )
         depth = 0.0 if shift is None else float(np.linalg.norm(shift))
         if shift is None or depth < TOUCH:
             continue

@@ -41,7 +41,7 @@ NEAR = 12.0  # m within which solid things are tested for contact
 
 
 class EmbeddedWorld:
-    """Implements `World`. camera: None drives without images (a black pixel stands for them), for agents that need none."""
+    """Implements `World`. camera: None drives without images (a black pixel stands for them), for the oracle."""
 
     dt = DT
 
@@ -127,7 +127,9 @@ class EmbeddedWorld:
         self.scenery = build_scenery(self.roads)
         self.surface = Surface(self.roads)
         solid = [prop for prop in self.scenery if prop.solid]
-        self._solid = [Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)]
+        self._solid = [
+            Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)
+        ]
         self._solid_at = np.array([(o.pose.x, o.pose.y) for o in self._solid]).reshape(-1, 2)
         self._solid_reach = np.array([np.hypot(o.length, o.width) / 2 for o in self._solid])
         if self._camera is not None:
@@ -140,7 +142,8 @@ class EmbeddedWorld:
         x, y = self.ego.pose.x, self.ego.pose.y
         distance = np.hypot(self._solid_at[:, 0] - x, self._solid_at[:, 1] - y) - self._solid_reach
         near = [self._solid[i] for i in np.flatnonzero(distance < 4.0)]
-        near += [obstacle_of(t) for t in (*self.vehicles, *self.people) if abs(t.pose.x - x) + abs(t.pose.y - y) < NEAR]
+        near += [obstacle_of(car) for car in self.vehicles if abs(car.pose.x - x) + abs(car.pose.y - y) < NEAR]
+        near += [obstacle_of(one) for one in self.people if abs(one.pose.x - x) + abs(one.pose.y - y) < NEAR]
         ego, self._contacts = resolve(self.ego, near)
         self.ego_state = replace(self.ego_state, pose=ego.pose, speed=ego.speed)
 
@@ -157,9 +160,7 @@ class EmbeddedWorld:
         here, near = ego.pose, self.progress
         signs = self._signs_near()
         lights = [one for one in self.signals if abs(one.pose.x - here.x) + abs(one.pose.y - here.y) < 40]
-        return label(
-            ego, self.vehicle.front_axle, self.route.line, near, self.vehicles, self.people, lights, signs
-        )
+        return label(ego, self.vehicle.front_axle, self.route.line, near, self.vehicles, self.people, lights, signs)
 
     def _signs_near(self) -> list[Sign]:
         here = self.ego.pose

@@ -66,10 +66,11 @@ def _resampled(line: Polyline, cuts: tuple[float, ...] = ()) -> tuple[NDArray[np
 
 
 def _strip(chain: Chain, dash: float) -> Mesh:
-    """One lane from junction to junction, three points across so that long trapezoids do not bend the lines."""
+    """One lane from junction to junction; at the road's edge it reaches a little under the kerb."""
     zone = min(SOLID_NEAR_JUNCTION, chain.line.length / 2)
     s, points = _resampled(chain.line, (zone, chain.line.length - zone))
-    across = np.array([chain.width / 2, -chain.width / 2])
+    under_kerb = 0.1 * np.array([chain.left == Border.EDGE, chain.right == Border.EDGE])
+    across = np.array([1, -1]) * (chain.width / 2 + under_kerb)
     xy = points[:, None] + across[:, None] * _normals(points)[:, None]
     left_s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(xy[:, 0], axis=0), axis=1))))
     phase = left_s / left_s[-1] * max(1, round(left_s[-1] / dash))
@@ -125,12 +126,11 @@ def _kerb_and_sidewalk(ring: shapely.LinearRing, style: GroundStyle) -> Mesh:
     for i, (color, texture) in enumerate(((style.kerb, Tex.PLAIN), (style.kerb, Tex.PLAIN), (tint, layer))):
         low, high = rows[i], rows[i + 1]
         uv = np.zeros((len(s) - 1, 4, 3))
-        uv[..., 0] = np.stack((s[:-1], s[:-1], s[1:], s[1:]), axis=1) / tile
-        uv[:, 1:3, 1] = SIDEWALK_WIDTH / tile
+        uv[..., 0] = np.stack((s[:-1], s[1:], s[1:], s[:-1]), axis=1) / tile
+        uv[:, :2, 1] = SIDEWALK_WIDTH / tile
         uv[..., 2] = texture
-        corners = np.stack((high[:-1], low[:-1], low[1:], high[1:]), axis=1)
-        uv[..., 1] = np.where(np.array([0, 1, 1, 0]), 0, SIDEWALK_WIDTH / tile)
-        parts.append(quads(corners, color, uv, spare=255))
+        corners = np.stack((high[:-1], high[1:], low[1:], low[:-1]), axis=1)
+        parts.append(quads(corners, color, uv))
     return merge(parts)
 
 
@@ -148,4 +148,4 @@ def yard_mesh(roads: RoadNetwork, margin: float = 600.0) -> Mesh:
     x0, y0, x1, y1 = np.add(roads.bounds, (-margin, -margin, margin, margin))
     corners = np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]])
     uv = np.concatenate((corners / tile, np.full((1, 4, 1), float(layer))), axis=2)
-    return quads(np.concatenate((corners, np.full((1, 4, 1), YARD_LEVEL)), axis=2), tint, uv, spare=255)
+    return quads(np.concatenate((corners, np.full((1, 4, 1), YARD_LEVEL)), axis=2), tint, uv)

@@ -45,7 +45,7 @@ class Area:
         return np.asarray((x >= self.near) & (x <= self.far) & (y >= self.right) & (y <= self.left))
 
 
-# The table of observation areas in supplement 2.1. Its text calls x the lateral axis, but its numbers are (forward, left).
+# The table in supplement 2.1. Its text calls x the lateral axis, but its numbers are (forward, left).
 A1 = Area(7.4, 14.0, -5.8, -0.8)
 A2 = Area(0.0, 8.2, -2.0, 2.0)
 A3 = Area(0.0, 50.0, -1.6, 1.6)
@@ -85,8 +85,8 @@ def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
 def in_the_way(vehicle: VehicleState, route: Polyline, near: float | None) -> bool:
     """Whether a car's box reaches into the strip that the ego sweeps along its route.
 
-    The areas are straight, and in a turn they sweep over cars that wait in the opposite lane: who stopped for those would
-    stand until they left, while they wait for the ego to clear the junction.
+    The areas are straight, and in a turn they sweep over cars that wait in the opposite lane: who stopped for those
+    would stand until they left, while they wait for the ego to clear the junction.
     """
     hit = route.project(vehicle.pose.x, vehicle.pose.y, near, window=MAX_VEHICLE_DISTANCE + 15.0)
     across = abs(math.sin(vehicle.pose.heading - hit.heading)) * vehicle.length / 2
@@ -98,7 +98,7 @@ def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleSt
     """Shortest distance between the boxes of the ego and the closest car whose centre is in A3, else 50 m."""
     ahead = np.flatnonzero(A3.contains(to_local(axle, _positions(vehicles))))
     own = box_corners(ego.pose, ego.length, ego.width)
-    gaps = [polygon_distance(own, box_corners(v.pose, v.length, v.width)) for v in (vehicles[i] for i in ahead)]
+    gaps = [polygon_distance(own, box_corners(v.pose, v.length, v.width)) for v in (vehicles[int(i)] for i in ahead)]
     return min([*gaps, MAX_VEHICLE_DISTANCE])
 
 

@@ -92,7 +92,9 @@ class Lights:
         for post in roads.posts:
             grouped[post.light].append(post)
         self.junctions = {
-            name: Junction(tuple(posts), Phase(int(rng.integers(len(posts))), LightState.GREEN, -float(rng.uniform(0, 4))))
+            name: Junction(
+                tuple(posts), Phase(int(rng.integers(len(posts))), LightState.GREEN, -float(rng.uniform(0, 4)))
+            )
             for name, posts in sorted(grouped.items())
         }
         self._detectors = _Detectors(self.junctions.values()) if self.junctions else None

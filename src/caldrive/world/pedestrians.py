@@ -90,15 +90,15 @@ def _crossings(
     here, heading = table[rows, :2], table[rows, 2]
     sideways = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
     inwards = np.where(shapely.contains_xy(middle, here + 0.3 * sideways)[:, None], sideways, -sideways)
-    beams = shapely.linestrings(np.stack((here + 0.3 * inwards, here + WIDEST_CROSSING * inwards), axis=1))
-    inside = shapely.intersection(beams, middle)
-    straight = shapely.get_geometry(inside, 0)
-    lengths = shapely.length(straight)
-    good = (lengths > 5) & (lengths < WIDEST_CROSSING - 1)
-    ends = shapely.get_point(straight[good], -1)
+    reach = np.arange(0.3, WIDEST_CROSSING, 0.5)
+    beams = here[:, None] + reach[:, None] * inwards[:, None]
+    inside = shapely.contains_xy(middle, beams.reshape(-1, 2)).reshape(beams.shape[:2])
+    last = np.argmin(inside, axis=1) - 1  # the first place beyond the far loop, and one back
+    good = ~inside.all(1) & (reach[last] > 5)
+    ends = shapely.points(beams[np.arange(len(last)), last][good])
     loop = np.argmin([shapely.distance(ring, ends) for ring in rings], axis=0)
     s = [rings[k].project(end) for k, end in zip(loop, ends, strict=True)]
-    at = shapely.get_coordinates(ends)
+    at = np.array([rings[k].interpolate(there).coords[0] for k, there in zip(loop, s, strict=True)]).reshape(-1, 2)
     return tuple(
         Crossing(i, float(row * STRIDE), start, end, int(k), float(there))
         for row, start, end, k, there in zip(rows[good], here[good], at, loop, s, strict=True)
@@ -113,7 +113,9 @@ class Pedestrians:
         lengths = self.walks.lengths
         room = int(lengths.sum() / SPACE_PER_PERSON)
         if n > room:
-            raise ValueError(f"found {n} people asked for, but {roads.name} has room for {room}: ask for fewer with --people")
+            raise ValueError(
+                f"found {n} people asked for, but {roads.name} has room for {room}: ask for fewer with --people"
+            )
         self.n = n
         self.loop = rng.choice(len(lengths), size=n, p=lengths / lengths.sum())
         self.s = rng.uniform(0, lengths[self.loop]) if n else np.zeros(0)
@@ -213,4 +215,5 @@ def may_walk(position: Points, way: Points, pace: Floats, cars: list[VehicleStat
         then = ahead + share * (way[:, :1] * u + way[:, 1:] * v) - speed * arrives
     room = np.where(speed > STOPPABLE_SPEED, speed * 4.5, 3.5 + speed * 0.5 + speed**2 / 10)
     blocked = (then > -2 * half - 1.0) & (then < np.where(speed > 0.3, room, 0.8))
-    return ~(entering & blocked).any(1)
+    free: NDArray[np.bool_] = ~(entering & blocked).any(1)
+    return free

@@ -6,6 +6,7 @@ the free stretch allows it, 90 on the longest ones. `python -m caldrive.world.pl
 
 from __future__ import annotations
 
+import itertools
 import math
 import subprocess
 import tempfile
@@ -129,7 +130,7 @@ def _add_street(nodes: ET.Element, edges: ET.Element, plan: Plan, street: Street
     for node, s in list(zip(ids, cuts, strict=True))[1:-1]:
         x, y = _cut(line, 0, s)[-1]
         ET.SubElement(nodes, "node", id=node, x=f"{x:.3f}", y=f"{y:.3f}", type="priority", radius="0.1")
-    for i, (start, end) in enumerate(zip(cuts, cuts[1:], strict=False)):
+    for i, (start, end) in enumerate(itertools.pairwise(cuts)):
         shape = _cut(line, start, end)
         forward, backward = _limit_at(ahead, start), _limit_at(back, length - end)
         _add_edge(edges, f"{name}{i}", ids[i], ids[i + 1], shape, forward)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 import sumolib
+from numpy.typing import NDArray
 
 from caldrive.datatypes import Command, Pose, Sign
 from caldrive.geometry import Polyline, moved, to_local, wrap_angle
@@ -42,7 +43,7 @@ class Lane:
 
 @dataclass(frozen=True)
 class LightPost:
-    """A post with a traffic light for one approach: foot pose (heading of the traffic it faces), stop line, SUMO links."""
+    """A post with a light for one approach: foot pose (heading of the traffic it faces), stop line, SUMO links."""
 
     light: str
     lane: str
@@ -93,16 +94,24 @@ class RoadNetwork:
         """Lanes outside junctions, in the order of their ids."""
         return tuple(lane for _, lane in sorted(self.lanes.items()) if not lane.internal)
 
+    @cached_property
+    def _boxes(self) -> NDArray[np.float64]:
+        lines = [lane.line.points for lane in self.driveable]
+        return np.array([(*line.min(0), *line.max(0)) for line in lines])
+
     def lane_at(self, pose: Pose) -> tuple[Lane, float]:
-        """The lane under a pose that runs its way, and the arc length there. Raises ValueError more than 4 m off any."""
+        """The lane under a pose that runs its way, and the arc length there. Raises ValueError over 4 m off any."""
         best: tuple[float, Lane, float] | None = None
-        for lane in self.driveable:
+        boxes = self._boxes
+        around = (boxes[:, :2] < (pose.x + 4.0, pose.y + 4.0)) & (boxes[:, 2:] > (pose.x - 4.0, pose.y - 4.0))
+        for lane in (self.driveable[i] for i in np.flatnonzero(around.all(1))):
             hit = lane.line.project(pose.x, pose.y)
             if math.cos(hit.heading - pose.heading) > 0.5 and (best is None or abs(hit.left) < best[0]):
                 best = (abs(hit.left), lane, hit.s)
         if best is None or best[0] > 4.0:
             raise ValueError(
-                f"found no lane of {self.name} at ({pose.x:.1f}, {pose.y:.1f}) with heading {pose.heading:.2f}: give a pose on a lane"
+                f"found no lane of {self.name} at ({pose.x:.1f}, {pose.y:.1f}) with heading {pose.heading:.2f}: "
+                "give a pose on a lane"
             )
         return best[1], best[2]
 
@@ -163,7 +172,7 @@ def beside(lane: Lane, s: float) -> Pose:
 
 
 def _read_posts(net: sumolib.net.Net, lanes: dict[str, Lane], standing: list[Pose] | None) -> tuple[LightPost, ...]:
-    """One post for each approach to a light: at the stop line, or the standing post of an OpenDRIVE map that faces it."""
+    """One post for each approach to a light: at the stop line, or the standing post of a map that faces it."""
     posts = []
     for lane in lanes.values():
         links = [c for c in net.getLane(lane.id).getOutgoing() if c.getTLSID()]
@@ -188,7 +197,7 @@ def _facing(standing: list[Pose], lane: Lane) -> Pose | None:
 
 
 def signs_at_limit_changes(lanes: dict[str, Lane]) -> tuple[Sign, ...]:
-    """A sign at the start of each lane whose limit differs from the one before, and a 30 on long streets without change."""
+    """A sign where the limit changes, and one along each street after a junction."""
     signs = []
     before = {s: lane for lane in lanes.values() for s in lane.successors}
     for lane in lanes.values():
@@ -208,7 +217,7 @@ def signs_at_limit_changes(lanes: dict[str, Lane]) -> tuple[Sign, ...]:
 def read_roads(
     name: str, network: Path, style: str, posts: list[Pose] | None = None, signs: Iterable[Sign] | None = None
 ) -> RoadNetwork:
-    """Reads a SUMO network. posts and signs: those of an OpenDRIVE map; None puts them where our own towns have them."""
+    """Reads a SUMO network. posts and signs: those of an OpenDRIVE map; None puts them where our towns have them."""
     net = sumolib.net.readNet(str(network), withInternal=True)
     lanes = _join(net, _read_lanes(net))
     if not any(not lane.internal for lane in lanes.values()):

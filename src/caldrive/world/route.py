@@ -1,4 +1,4 @@
-"""Where to drive: an A* plan over the lanes, the line to follow and the command ahead of each junction (supplement 2.2)."""
+"""Where to drive: an A* plan over the lanes, the line to follow and each junction's command (supplement 2.2)."""
 
 from __future__ import annotations
 
@@ -77,13 +77,11 @@ def _onward(roads: RoadNetwork, lane: Lane) -> Lane | None:
     """The straightest successor."""
     following = [roads.lanes[s] for s in lane.successors]
     end = lane.line.heading_at(lane.line.length)
-    return max(
-        following, key=lambda one: math.cos(one.line.heading_at(one.line.length) - end), default=None
-    )
+    return max(following, key=lambda one: math.cos(one.line.heading_at(one.line.length) - end), default=None)
 
 
 def _thinned(points: Points) -> Points:
-    """Without points that lie on top of the one before: maps are off by millimetres where lanes meet, also backwards."""
+    """Without points on top of the one before: where lanes meet, maps are off by millimetres, also backwards."""
     kept = [points[0]]
     for point in points[1:]:
         if abs(point[0] - kept[-1][0]) + abs(point[1] - kept[-1][1]) > CLOSEST:
@@ -99,13 +97,14 @@ def follow_lanes(roads: RoadNetwork, ids: list[str], start: float, end: float) -
     while reached < length + BEYOND_GOAL and (following := _onward(roads, path[-1])) is not None:
         path.append(following)
         reached += following.line.length
-    ahead = [first.line.pose_at(start)]
-    points = [[(ahead[0].x, ahead[0].y)], first.line.points[first.line.s > start + 0.01]]
+    here = first.line.pose_at(start)
+    points = [np.array([(here.x, here.y)]), first.line.points[first.line.s > start + 0.01]]
     points += [lane.line.points for lane in path[1:]]
     begins = np.cumsum([-start] + [lane.line.length for lane in path[:-1]])
     lanes = [(lane.id, float(s)) for lane, s in zip(path, begins, strict=True)]
     inside = [turn for turn in _turns(roads, lanes) if turn.start < length]
-    return Route(Polyline(_thinned(np.concatenate([p for p in points if len(p)]))), length, tuple(inside), tuple(lanes))
+    line = Polyline(_thinned(np.concatenate([*points])))
+    return Route(line, length, tuple(inside), tuple(lanes))
 
 
 def plan_route(roads: RoadNetwork, start: Pose, goal: Pose) -> Route:

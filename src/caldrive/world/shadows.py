@@ -14,26 +14,30 @@ from PIL import Image, ImageDraw
 from caldrive.geometry import box_corners
 from caldrive.world.scenery import Prop
 
-RESOLUTION = 0.5  # m of one pixel
+RESOLUTION = 0.25  # m of one pixel
 MARGIN = 30.0  # m around the roads
 TALLEST = 32.0  # m, the value of a full pixel
 
-Heights = NDArray[np.float32]
+Heights = NDArray[np.uint8]  # in units of TALLEST / 255
+
+
+def _units(height: float) -> int:
+    return round(min(height / TALLEST, 1.0) * 255)
 
 
 def _drawn(props: Sequence[Prop], bounds: tuple[float, float, float, float], kind: str) -> Heights:
     """Heights of the tops of all props of a kind, seen from above; row 0 at the lowest y."""
     x0, y0, x1, y1 = bounds
     size = (round((x1 - x0) / RESOLUTION), round((y1 - y0) / RESOLUTION))
-    picture = Image.new("F", size, 0.0)
+    picture = Image.new("L", size, 0)
     draw = ImageDraw.Draw(picture)
     for p in sorted((p for p in props if p.kind == kind), key=lambda p: p.height):
         if kind == "tree":
-            r, x, y = 0.2 * p.height, p.pose.x, p.pose.y
-            draw.ellipse([((u - x0) / RESOLUTION, (v - y0) / RESOLUTION) for u, v in ((x - r, y - r), (x + r, y + r))], fill=0.8 * p.height)
+            r, x, y = 0.2 * p.height / RESOLUTION, (p.pose.x - x0) / RESOLUTION, (p.pose.y - y0) / RESOLUTION
+            draw.ellipse((x - r, y - r, x + r, y + r), fill=_units(0.8 * p.height))
         else:
             corners = (box_corners(p.pose, p.length, p.width) - (x0, y0)) / RESOLUTION
-            draw.polygon([(u, v) for u, v in corners.tolist()], fill=p.height + 1.2)
+            draw.polygon([(u, v) for u, v in corners.tolist()], fill=_units(p.height + 1.2))
     return np.asarray(picture)
 
 
@@ -51,12 +55,12 @@ def _shifted(heights: Heights, columns: int, rows: int) -> Heights:
 def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
     """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the way's fall."""
     flat = float(np.hypot(sun[0], sun[1]))
-    fall, shade = float(sun[2]) / flat, heights.copy()
-    reach = float(heights.max()) / fall
-    step = RESOLUTION
+    fall, shade = float(sun[2]) / flat * 255 / TALLEST, heights.copy()
+    reach, step = float(heights.max()) / fall, RESOLUTION
     while step < reach:
         columns, rows = (round(step * float(s) / flat / RESOLUTION) for s in sun[:2])
-        np.maximum(shade, _shifted(shade, columns, rows) - np.float32(step * fall), out=shade)
+        lower = np.uint8(min(255, round(step * fall)))
+        np.maximum(shade, np.maximum(_shifted(shade, columns, rows), lower) - lower, out=shade)
         step *= 2
     return shade
 
@@ -73,5 +77,4 @@ def shadow_heights(
     """Shadow heights (rows, columns, 2) in units of TALLEST / 255: of buildings with trees, of buildings alone."""
     houses = cast(_drawn(props, bounds, "building"), sun)
     trees = cast(_drawn(props, bounds, "tree"), sun)
-    both = np.stack((np.maximum(houses, trees), houses), axis=-1)
-    return np.asarray(np.clip(both / TALLEST * 255, 0, 255), dtype=np.uint8)
+    return np.stack((np.maximum(houses, trees), houses), axis=-1)

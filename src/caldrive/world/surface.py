@@ -47,12 +47,14 @@ class Surface:
         return np.array(canvas, dtype=np.int32)
 
     def shares(self, car: VehicleState, travel: float) -> tuple[float, float]:
-        """Shares of the car's area on the opposite lane and on the sidewalk. travel: heading of the route there, rad."""
+        """Shares of the car's area on the opposite lane and on the sidewalk. travel: the route's heading there, rad."""
         cells = np.floor((_spread(car) - self.origin) / CELL).astype(int)
         inside = ((cells >= 0) & (cells < self.shape[::-1])).all(1)
         x, y = cells[inside].T
         lanes = self.lane[y, x]
-        opposite = sum(int((lanes == i).sum()) for i in np.unique(lanes) if i and self._opposes(int(i), car.pose, travel))
+        opposite = sum(
+            int((lanes == i).sum()) for i in np.unique(lanes) if i and self._opposes(int(i), car.pose, travel)
+        )
         return opposite / len(cells), float(self.sidewalk[y, x].sum()) / len(cells)
 
     def _opposes(self, number: int, pose: Pose, travel: float) -> bool:

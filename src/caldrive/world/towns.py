@@ -27,13 +27,14 @@ def _cache_folder() -> Path:
 
 @lru_cache(maxsize=4)
 def load_town(town: str) -> RoadNetwork:
-    """The roads of `town01`, `town02` or an OpenDRIVE file. Raises ValueError or FileNotFoundError with what to type."""
+    """The roads of `town01`, `town02` or an OpenDRIVE file. Raises ValueError or FileNotFoundError."""
     if town in TOWNS:
         return read_roads(town, _DATA / f"{town}.net.xml", style=town)
     path = Path(town)
     if path.suffix != ".xodr":
         raise ValueError(
-            f"found town {town!r}, wanted one of {', '.join(TOWNS)} or an OpenDRIVE file: type --town town01 or --town FILE.xodr"
+            f"found town {town!r}, wanted one of {', '.join(TOWNS)} or an OpenDRIVE file: "
+            "type --town town01 or --town FILE.xodr"
         )
     if not path.is_file():
         raise FileNotFoundError(f"found no file {town}, wanted an OpenDRIVE map: check the path given to --town")

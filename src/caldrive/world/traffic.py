@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import libsumo
 import numpy as np
 
-from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, VehicleState
+from caldrive.datatypes import LightState, PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved, wrap_angle
 from caldrive.world.lights import Lights
 from caldrive.world.roads import Lane, RoadNetwork
@@ -69,7 +69,9 @@ class Traffic:
                 if math.hypot(here.x - ego.pose.x, here.y - ego.pose.y) > CLEAR_OF_EGO:
                     free.append((lane, float(s)))
         if n > len(free):
-            raise ValueError(f"found {n} cars asked for, but {self.roads.name} has room for {len(free)}: ask for fewer with --cars")
+            raise ValueError(
+                f"found {n} cars asked for, but {self.roads.name} has room for {len(free)}: ask for fewer with --cars"
+            )
         return [free[int(i)] for i in self.rng.permutation(len(free))[:n]]
 
     def _walk(self, edge: str, steps: int = 30) -> list[str]:
@@ -157,7 +159,7 @@ class Traffic:
                     self._add(name, *self._places(1, ego)[0])
                 continue
             way, index = libsumo.vehicle.getRoute(name), libsumo.vehicle.getRouteIndex(name)
-            if 0 <= index and len(way) - index < 6 and libsumo.vehicle.getRoadID(name) == way[index]:
+            if index >= 0 and len(way) - index < 6 and libsumo.vehicle.getRoadID(name) == way[index]:
                 libsumo.vehicle.setRoute(name, self._walk(way[index]))
             x, y = libsumo.vehicle.getPosition(name)
             seen = math.hypot(x - ego.pose.x, y - ego.pose.y) < OUT_OF_SIGHT

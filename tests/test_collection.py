@@ -1,0 +1,171 @@
+"""The recorder: three cameras with labels of their own, and a recording that can be broken off at any moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from caldrive.datatypes import Control
+from caldrive.driving import collection
+from caldrive.driving.collection import BASELINES, CollectConfig, Disturbance, collect, episode_path
+from caldrive.episodes import Episode, read_episode
+from caldrive.world.embedded import EmbeddedWorld
+from caldrive.world.traffic import stop_sumo
+
+TINY = CollectConfig("town02", (1, 6), episodes=3, duration=2.0, cars=3, people=10, width=48, height=24, seed=4)
+
+
+@pytest.fixture(autouse=True)
+def _fresh(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Each test begins like a new process and leaves nothing running."""
+    monkeypatch.setattr(collection, "_world", None)
+    yield
+    if collection._world is not None:
+        collection._world.close()
+    stop_sumo()
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unbroken")
+    assert [k for k, _ in collect(TINY, folder)] == [0, 1, 2]
+    return folder
+
+
+@pytest.fixture(scope="module")
+def episode(unbroken: Path) -> Episode:
+    return read_episode(episode_path(unbroken, 0))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_every_moment_is_seen_by_three_cameras_at_their_baselines(episode: Episode) -> None:
+    assert len(episode) == 3 * 20
+    frames = list(episode)
+    assert {(frame.camera, frame.camera_left) for frame in frames} == set(enumerate(BASELINES))
+    assert {frame.image.shape for frame in frames} == {(24, 48, 3)}
+    assert [frame.index for frame in frames if frame.camera == 1] == list(range(20))
+
+
+def test_a_camera_keeps_its_yaw_which_is_15_degrees_at_most(unbroken: Path) -> None:
+    yaws = set()
+    for k in range(3):
+        columns = read_episode(episode_path(unbroken, k)).columns
+        for camera in range(3):
+            (yaw,) = set(columns["camera_yaw"][columns["camera"] == camera])
+            yaws.add(float(yaw))
+    assert len(yaws) == 9
+    assert max(map(abs, yaws)) <= math.radians(15)
+
+
+def test_each_camera_has_the_labels_of_its_own_place(episode: Episode) -> None:
+    for i in range(20):
+        left, middle, right = (episode[camera * 20 + i] for camera in (2, 1, 0))
+        assert left.time == middle.time == right.time
+        assert left.driven == middle.driven == right.driven
+        a, b = left.affordances, right.affordances
+        straight = abs(a.relative_angle + left.camera_yaw) < 0.02
+        if straight:
+            swing = 1.3 * (math.sin(left.camera_yaw) - math.sin(right.camera_yaw))
+            assert b.center_distance - a.center_distance == pytest.approx(1.0 + swing, abs=0.05)
+        turned = a.relative_angle - b.relative_angle
+        assert turned == pytest.approx(right.camera_yaw - left.camera_yaw, abs=0.15)
+
+
+def test_the_cameras_see_different_pictures_that_change(episode: Episode) -> None:
+    assert len(set(episode.jpegs)) > 50
+
+
+def test_weathers_take_turns(unbroken: Path) -> None:
+    assert [read_episode(episode_path(unbroken, k)).scenario.weather for k in range(3)] == [1, 6, 1]
+
+
+def test_episodes_differ_in_start_and_seed(unbroken: Path) -> None:
+    found = [read_episode(episode_path(unbroken, k)).scenario for k in range(3)]
+    assert len({one.seed for one in found}) == len({one.start for one in found}) == 3
+
+
+def test_a_recording_broken_off_between_episodes_ends_like_an_unbroken_one(unbroken: Path, tmp_path: Path) -> None:
+    recording = collect(TINY, tmp_path)
+    next(recording)
+    recording.close()  # type: ignore[attr-defined]
+    first = contents(tmp_path)
+    assert list(first) == ["episode-00000.parquet"]
+    collection._world = None
+    assert [k for k, _ in collect(TINY, tmp_path)] == [1, 2]
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_recording_killed_within_an_episode_leaves_no_half_file(
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps, go_on = [], EmbeddedWorld.step
+
+    def break_off(world: EmbeddedWorld, control: Control) -> object:
+        steps.append(control)
+        if len(steps) == 30:
+            raise KeyboardInterrupt
+        return go_on(world, control)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(EmbeddedWorld, "step", break_off)
+        with pytest.raises(KeyboardInterrupt):
+            list(collect(TINY, tmp_path))
+    assert list(contents(tmp_path)) == ["episode-00000.parquet"]
+    assert [k for k, _ in collect(TINY, tmp_path)] == [1, 2]
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_finished_recording_has_nothing_left_to_do(unbroken: Path) -> None:
+    before = contents(unbroken)
+    assert list(collect(TINY, unbroken)) == []
+    assert contents(unbroken) == before
+
+
+controls = st.builds(
+    lambda effort, steer: Control(max(effort, 0.0), max(-effort, 0.0), steer), st.floats(-1, 1), st.floats(-1, 1)
+)
+
+
+@given(st.integers(0, 2**32), st.lists(st.tuples(controls, st.floats(0, 25)), min_size=1, max_size=60))
+def test_a_disturbance_is_bounded_and_ends(seed: int, drive: list[tuple[Control, float]]) -> None:
+    disturbance = Disturbance(np.random.default_rng(seed))
+    for control, speed in drive:
+        pushed = disturbance.apply(control, speed)  # a Control checks its own ranges
+        assert abs(pushed.steer - control.steer) <= 0.4 + 1e-9
+        assert abs((pushed.throttle - pushed.brake) - (control.throttle - control.brake)) <= 0.5 + 1e-9
+
+
+def pushes(speed: float, seed: int = 0, steps: int = 20_000, control: Control | None = None) -> list[Control]:
+    disturbance, control = Disturbance(np.random.default_rng(seed)), control or Control(throttle=0.4)
+    return [disturbance.apply(control, speed) for _ in range(steps)]
+
+
+def test_disturbances_are_short_and_leave_most_of_the_drive_alone() -> None:
+    disturbed = [one != Control(throttle=0.4) for one in pushes(5.0)]
+    assert 0.03 < np.mean(disturbed) < 0.3
+    assert max(len(list(run)) for pushed, run in groupby(disturbed) if pushed) < 14
+
+
+def test_a_slow_car_is_not_disturbed() -> None:
+    assert set(pushes(1.0, steps=3000)) == {Control(throttle=0.4)}
+
+
+def test_the_push_at_the_wheel_goes_to_both_sides_and_weakens_with_speed() -> None:
+    slow, fast = (np.array([one.steer for one in pushes(speed)]) for speed in (5.0, 20.0))
+    assert slow.max() > 0.25
+    assert slow.min() < -0.25
+    assert np.abs(fast).max() <= 0.4 * 6 / 20 + 1e-9
+
+
+def test_a_hard_braking_car_is_left_to_brake() -> None:
+    assert {(one.throttle, one.brake) for one in pushes(8.0, control=Control(brake=0.8))} == {(0.0, 0.8)}
