@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -39,15 +40,9 @@ def arrow(
     )
 
 
-def note(axes: Axes, x: float, y: float, text: str, color: str = INK, size: float = 9.5, **more: object) -> None:
-    axes.text(
-        x,
-        y,
-        text,
-        color=color,
-        fontsize=size,
-        **{"ha": "left", "va": "center", "zorder": 9, "linespacing": 1.35} | more,
-    )
+def note(axes: Axes, x: float, y: float, text: str, color: str = INK, size: float = 9.5, **more: Any) -> None:
+    usual: dict[str, Any] = {"ha": "left", "va": "center", "zorder": 9, "linespacing": 1.35}
+    axes.text(x, y, text, color=color, fontsize=size, **(usual | more))
 
 
 def car(
@@ -60,8 +55,9 @@ def car(
         for y in (-b + 0.12, b - 0.12):
             turned = Affine2D().rotate(angle).translate(x, y) + place
             axes.add_patch(Rectangle((-0.34, -0.13), 0.68, 0.26, color="#2b2f36", zorder=4, transform=turned))
-    body = FancyBboxPatch((-a + 0.45, -b + 0.45), length - 0.9, width - 0.9, boxstyle="round,pad=0.45,rounding_size=0.5",
-                          fc=color, ec=INK, lw=1.1, zorder=5, transform=place, alpha=0.93)  # fmt: skip
+    inner, style = (length - 0.9, width - 0.9), "round,pad=0.45,rounding_size=0.5"
+    look: dict[str, Any] = {"fc": color, "ec": INK, "lw": 1.1, "alpha": 0.93}
+    body = FancyBboxPatch((-a + 0.45, -b + 0.45), *inner, boxstyle=style, zorder=5, transform=place, **look)
     axes.add_patch(body)
     for corners in (
         [(0.75, 0.62), (0.25, 0.58), (0.25, -0.58), (0.75, -0.62)],
@@ -274,8 +270,8 @@ def main() -> None:
         2, 1, height_ratios=(14.25, 10.1), hspace=0.07, left=0.01, right=0.99, top=0.965, bottom=0.01
     )
     titles = "What the ego looks at (supplement 2.1)", "What the signs mean"
-    for spec, draw, title in zip(grid, (draw_areas, draw_signs), titles, strict=True):
-        axes = figure.add_subplot(spec)
+    for i, (draw, title) in enumerate(zip((draw_areas, draw_signs), titles, strict=True)):
+        axes = figure.add_subplot(grid[i])
         draw(axes)
         axes.set_aspect("equal")
         axes.axis("off")

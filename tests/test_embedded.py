@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
+from typing import Any
 
 import pytest
 
@@ -45,14 +46,14 @@ def world() -> Iterator[EmbeddedWorld]:
     one.close()
 
 
-def along_the_street(start: float = 10.0, goal: float = 70.0, **more: int) -> Scenario:
+def along_the_street(start: float = 10.0, goal: float = 70.0, **more: Any) -> Scenario:
     """Straight on, on the longest lane of town02."""
     lane = max(load_town("town02").driveable, key=lambda one: one.line.length).line
     limit = (goal - start) * 0.36
     return Scenario("town02", 1, lane.pose_at(start), lane.pose_at(goal), time_limit=limit, **more)
 
 
-def around_a_corner(**more: int) -> Scenario:
+def around_a_corner(**more: Any) -> Scenario:
     """From 30 m before a junction to 40 m behind it, to the left, in town02."""
     roads = load_town("town02")
     for post in roads.posts:
@@ -239,7 +240,7 @@ def test_a_closed_world_can_be_entered_again() -> None:
         ({"n_pedestrians": 50_000}, "people asked for"),
     ],
 )
-def test_a_scenario_that_cannot_be_is_refused(change: dict[str, object], message: str, world: EmbeddedWorld) -> None:
+def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], message: str, world: EmbeddedWorld) -> None:
     with pytest.raises(ValueError, match=message):
         world.reset(replace(along_the_street(), **change))
 

@@ -153,8 +153,8 @@ def test_a_post_tells_the_links_of_its_lane(town: RoadNetwork) -> None:
 def test_posts_and_signs_stand_on_the_sidewalk(town: RoadNetwork) -> None:
     import shapely
 
-    for thing in (*town.posts, *town.signs):
-        assert town.sidewalk.covers(shapely.Point(thing.pose.x, thing.pose.y))
+    poses = [post.pose for post in town.posts] + [sign.pose for sign in town.signs]
+    assert all(town.sidewalk.covers(shapely.Point(pose.x, pose.y)) for pose in poses)
 
 
 def test_roadway_and_sidewalk_are_valid_and_do_not_overlap(town: RoadNetwork) -> None:

@@ -61,6 +61,12 @@ def test_a_route_against_the_lane_makes_it_the_opposite_one(surface: Surface, st
     assert shares(surface, here, here.heading + math.pi)[0] == 1.0
 
 
+@pytest.mark.parametrize("turn", [-math.pi / 2, math.pi / 2])
+def test_a_lane_across_the_route_is_not_the_opposite_one(turn: float, surface: Surface, street: Lane) -> None:
+    here = street.line.pose_at(street.line.length / 2)
+    assert shares(surface, here, here.heading + turn)[0] == 0.0
+
+
 def test_a_slanted_car_is_on_the_sidewalk_with_its_corner_only(
     surface: Surface, street: Lane, town02: RoadNetwork
 ) -> None:
@@ -86,7 +92,8 @@ def test_far_from_the_town_there_is_neither(surface: Surface) -> None:
 def test_the_sidewalk_is_found_all_over_the_town(surface: Surface, town02: RoadNetwork) -> None:
     rng = np.random.default_rng(0)
     x0, y0, x1, y1 = town02.bounds
-    poses = [Pose(*rng.uniform((x0 - 8, y0 - 8), (x1 + 8, y1 + 8)), rng.uniform(-3, 3)) for _ in range(400)]
+    places = rng.uniform((x0 - 8, y0 - 8, -3), (x1 + 8, y1 + 8, 3), (400, 3)).tolist()
+    poses = [Pose(x, y, heading) for x, y, heading in places]
     boxes = [shapely.Polygon(box_corners(pose, 4.2, 1.8)) for pose in poses]
     true = [box.intersection(town02.sidewalk).area / box.area for box in boxes]
     found = [shares(surface, pose, 0.0)[1] for pose in poses]

@@ -91,6 +91,9 @@ class Projection:
     heading: float
 
 
+BLEND = 1.0  # m
+
+
 class Polyline:
     """A directed line through points (N, 2), N >= 2, measured by arc length s in metres."""
 
@@ -119,15 +122,18 @@ class Polyline:
         return min(max(bisect_right(self._s, s) - 1, 0), len(self._h) - 1)
 
     def heading_at(self, s: float) -> float:
-        """The tangent's heading at s, turning evenly from the middle of one segment to the middle of the next."""
+        """The tangent's heading at s; around a vertex it turns evenly, within BLEND metres to either side."""
         i = self._segment(s)
-        middle = (self._s[i] + self._s[i + 1]) / 2
-        j = i + (1 if s >= middle else -1)
-        if not 0 <= j < len(self._h):
+        ahead = s >= (self._s[i] + self._s[i + 1]) / 2
+        j, vertex = (i + 1, i + 1) if ahead else (i - 1, i)
+        away, reach = abs(s - self._s[vertex]), self._reach(i)
+        if not 0 <= j < len(self._h) or away >= reach:
             return self._h[i]
-        other = (self._s[j] + self._s[j + 1]) / 2
-        share = (s - middle) / (other - middle)
+        share = (reach - away) / (reach + self._reach(j))
         return wrap_angle(self._h[i] + share * wrap_angle(self._h[j] - self._h[i]))
+
+    def _reach(self, i: int) -> float:
+        return min(BLEND, (self._s[i + 1] - self._s[i]) / 2)
 
     def pose_at(self, s: float) -> Pose:
         """The pose on the line at s; beyond its ends, straight on."""

@@ -82,7 +82,7 @@ def person_instances(pedestrians: Sequence[PedestrianState]) -> Instances:
 def in_view(made: Instances, view: View, far: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Which instances can be seen, and how far away all are (m)."""
     at = made["placed"][:, :2].astype(float)
-    distance = np.hypot(*(at - view.eye).T)
+    distance = np.hypot(*(at - view.eye[:2]).T)
     return view.sees(at, 3.0) & (distance < far), distance
 
 

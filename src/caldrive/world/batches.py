@@ -7,8 +7,8 @@ import numpy as np
 
 from caldrive.world.actors import INSTANCE, Instances
 from caldrive.world.gl import gl_context, programs
-from caldrive.world.meshes import Mesh
-from caldrive.world.tiles import Tiles, View
+from caldrive.world.meshes import Mesh, Triangles
+from caldrive.world.tiles import Tiles
 
 _FORMAT = {"position": "3f", "uv": "3f", "normal": "4f1", "color": "4f1"}
 _SKIPPED = {"position": "3x4", "uv": "3x4", "normal": "4x1", "color": "4x1"}
@@ -27,19 +27,18 @@ def vertex_array(
 
 
 class TownBatch:
-    """A mesh on the graphics side whose triangles are chosen anew for each picture."""
+    """A town's mesh, whose triangles are chosen anew for each picture."""
 
     def __init__(self, tiles: Tiles, program: moderngl.Program, layout: tuple[str, ...]) -> None:
         gl = gl_context()
         self.tiles = tiles
-        self.index = gl.buffer(reserve=max(4, sum(len(i) for i in tiles.indices) * 4), dynamic=True)
+        self.index = gl.buffer(reserve=max(4, tiles.faces.triangles.nbytes), dynamic=True)
         self.data = gl.buffer(np.ascontiguousarray(tiles.vertices).tobytes())
         self.array = vertex_array(program, self.data, layout, self.index)
 
-    def draw(self, view: View, detail: float, far: float) -> None:
-        indices = self.tiles.visible(view, detail, far)
-        self.index.write(indices)
-        self.array.render(vertices=len(indices))
+    def draw(self, triangles: Triangles) -> None:
+        self.index.write(triangles)
+        self.array.render(vertices=triangles.size)
 
     def release(self) -> None:
         self.array.release()

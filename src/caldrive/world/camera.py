@@ -23,12 +23,15 @@ from caldrive.world.people import far_person_mesh, person_mesh
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import Prop
 from caldrive.world.shadows import shadow_heights, town_bounds
+from caldrive.world.sight import Cells, Sight
 from caldrive.world.sky import dome_mesh, panorama
-from caldrive.world.tiles import FAR as TOWN_FAR
 from caldrive.world.tiles import DETAIL, Level, Tiles, View
 from caldrive.world.weather import Look, look, weather
 
 GLOW_FAR = 150.0  # m
+TOWN_FAR = 260.0  # m beyond which no more of the town is drawn
+ROOF_LEVEL = 5.0  # m of eye height from which houses no longer hide what lies behind them
+PLACE = 8.0  # m, the size of the squares within which one decision holds on what is in sight
 GLOWS = {LightState.RED: (1.0, 0.10, 0.06), LightState.YELLOW: (1.0, 0.74, 0.10), LightState.GREEN: (0.12, 1.0, 0.42)}
 SUN_AZIMUTH = {"town01": 0.95, "town02": 2.5}  # rad
 PAINT = {  # colours of centre lines, edge lines and asphalt, and the widths that the road shader wants
@@ -63,6 +66,7 @@ class Camera:
         )
         self._glow_array = gl.vertex_array(made.glow, [(made.corners, "2f", "corner"), (self._lamps, "4f 4f/i", "lamp", "tint")])
         self._rain_array = gl.vertex_array(made.rain, [(made.corners, "2f", "corner")])
+        self._sight = Sight(scenery)
         at = [(p.pose.x, p.pose.y, p.pose.heading) for p in roads.posts]
         self._posts = np.array(at).reshape(-1, 3)
         self._targets: dict[tuple[int, int], Target] = {}
@@ -162,8 +166,18 @@ class Camera:
         self._people[1].draw(people[seen & ~near])
 
     def _draw_town(self, lens: Lens, view: View) -> None:
-        self._road.draw(view, DETAIL, TOWN_FAR)
-        self._static.draw(view, DETAIL * max(1.0, lens.focal / 160), TOWN_FAR)
+        above = lens.height > ROOF_LEVEL
+        square = np.floor(view.eye[:2] / PLACE)
+        low = square * PLACE
+        detail = DETAIL * max(1.0, lens.focal / 160)
+        place = (*square.tolist(), above, detail)
+
+        def seen() -> Cells | None:
+            return None if above else self._sight.seen_from(low, low + PLACE, TOWN_FAR)
+
+        for batch in (self._road, self._static):
+            far = 2 * TOWN_FAR if above else TOWN_FAR
+            batch.draw(batch.tiles.visible(view, place, seen, low + PLACE / 2, detail, far))
         gl_context().disable(moderngl.CULL_FACE)
         self._dome.render()
 
@@ -179,7 +193,7 @@ class Camera:
 
     def _draw_lamps(self, view: View, lights: Mapping[str, LightState], wet: bool) -> None:
         """The lit lamps, and on a wet road their streaks."""
-        seen = view.sees(self._posts[:, :2], 1.0) & (np.hypot(*(self._posts[:, :2] - view.eye).T) < GLOW_FAR)
+        seen = view.sees(self._posts[:, :2], 1.0) & (np.hypot(*(self._posts[:, :2] - view.eye[:2]).T) < GLOW_FAR)
         rows = []
         for k in np.flatnonzero(seen):
             state = lights.get(self.roads.posts[k].id)

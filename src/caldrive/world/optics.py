@@ -47,7 +47,7 @@ class Lens:
         """What the picture covers on the plane."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
         wide = math.tan(math.radians(self.fov) / 2) if abs(self.pitch) < 0.1 else 1e3
-        return View(np.array([self.pose.x, self.pose.y]), np.array([c, s]), np.array([-s, c]), wide)
+        return View(np.array([self.pose.x, self.pose.y, self.height]), np.array([c, s]), np.array([-s, c]), wide)
 
 
 def mounted(ego: VehicleState, mount: CameraConfig) -> Lens:

@@ -25,6 +25,7 @@ WIDEST_CROSSING = 22.0  # m
 CORRIDOR = 2.05  # m to either side of a car's middle
 PATIENCE = 5.0  # s of waiting at the kerb before walking on, or on the road before turning back
 STOPPABLE_SPEED = 9.2  # m/s: from it a full brake stops within the hazard area A2
+MAY_GAIN = 2.0  # m/s² by which a moving car may speed up
 SPACE_PER_PERSON = 3.0  # m of sidewalk
 KERB = 1.2  # m from the middle of the sidewalk
 STRIDE = 0.05  # m between the places of a walk that are worked out beforehand
@@ -211,9 +212,12 @@ def may_walk(position: Points, way: Points, pace: Floats, cars: list[VehicleStat
     share = np.where(np.abs(sideways) > 1e-6, (np.abs(left) - CORRIDOR) / np.maximum(np.abs(sideways), 1e-6), np.inf)
     entering = (share > 0) & (share <= 1) & (left * sideways < 0)
     arrives = share * np.hypot(*way.T)[:, None] / pace[:, None]
+    moving = speed > 0.3
     with np.errstate(invalid="ignore"):
         then = ahead + share * (way[:, :1] * u + way[:, 1:] * v) - speed * arrives
-    room = np.where(speed > STOPPABLE_SPEED, speed * 4.5, 3.5 + speed * 0.5 + speed**2 / 10)
-    blocked = (then > -2 * half - 1.0) & (then < np.where(speed > 0.3, room, 0.8))
+        gained = np.where(moving, MAY_GAIN, 0.0) * arrives  # they reckon with a car that speeds up
+        nearest, fastest = then - gained * arrives / 2, speed + gained
+        room = np.where(fastest > STOPPABLE_SPEED, fastest * 4.5, 3.5 + fastest * 0.5 + fastest**2 / 10)
+        blocked = (then > -2 * half - 1.0) & (nearest < np.where(moving, room, 0.8))
     free: NDArray[np.bool_] = ~(entering & blocked).any(1)
     return free

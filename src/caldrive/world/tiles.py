@@ -1,8 +1,8 @@
-"""What of a town can be seen from where: its triangles sorted into tiles, and the tiles in view, nearest first."""
+"""What of a town is drawn from where: first its tiles in sight of a place, then of these the triangles that face the camera."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.world.meshes import Mesh
+from caldrive.world.sight import CELL, Cells
 
-TILE = 24.0  # m
-DETAIL = 45.0  # m within which details are drawn
-FAR = 260.0  # m beyond which nothing is drawn
+DETAIL = 40.0  # m within which details are drawn
+EVERYWHERE = 100.0  # m: larger triangles belong to no tile
+KEPT = 128  # places whose triangles are remembered
+
+Floats = NDArray[np.float32]
 
 
 class Level(IntEnum):
-    """From how far a tile is drawn."""
+    """From how far a mesh is drawn."""
 
     ALWAYS = 0
     NEAR = 1
@@ -26,48 +29,90 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class View:
-    """A camera's footprint on the plane: eye (2,), unit vectors ahead and to the left (2,), tangent of half the view's angle."""
+    """What a camera covers: eye (3,), unit vectors ahead and to the left (2,), tangent of half the view's angle."""
 
     eye: NDArray[np.float64]
     ahead: NDArray[np.float64]
     left: NDArray[np.float64]
     tangent: float
 
-    def sees(self, centers: NDArray[np.float64], reach: NDArray[np.float64] | float) -> NDArray[np.bool_]:
-        """Which circles (N, 2) of a radius reach into the view."""
-        d = centers - self.eye
-        ahead, beside = d @ self.ahead, np.abs(d @ self.left)
-        outside = (beside - ahead * self.tangent) / np.sqrt(1 + self.tangent**2)
-        return np.asarray((outside < reach) & (ahead > -reach))
+    def sees(self, at: NDArray[np.floating], reach: NDArray[np.floating] | float) -> NDArray[np.bool_]:
+        """Which circles around points (N, 2) of the plane reach into the view."""
+        slope = np.sqrt(1 + self.tangent**2)
+        ahead = at @ self.ahead.astype(at.dtype)
+        ahead -= self.eye[:2] @ self.ahead
+        beside = np.abs(at @ self.left.astype(at.dtype) - self.eye[:2] @ self.left)
+        beside -= ahead * self.tangent
+        return np.asarray((beside < reach * slope) & (ahead > -reach))
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Triangles with what is needed to leave some out: planes (n, n·p), middles and radii on the plane."""
+
+    triangles: NDArray[np.uint32]  # (N, 3)
+    planes: Floats  # (N, 4)
+    middles: Floats  # (N, 2)
+    reach: Floats  # (N,)
+
+    def take(self, chosen: NDArray[np.int64]) -> _Faces:
+        return _Faces(self.triangles[chosen], self.planes[chosen], self.middles[chosen], self.reach[chosen])
+
+
+def _faces(vertices: NDArray[np.void], triangles: NDArray[np.uint32]) -> _Faces:
+    corners = vertices["position"][triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = corners[..., :2]
+    middles = flat.mean(axis=1)
+    reach = np.sqrt(((flat - middles[:, None]) ** 2).sum(axis=2).max(axis=1))
+    planes = np.column_stack((normal, -(normal * corners[:, 0]).sum(axis=1)))
+    return _Faces(triangles, planes, middles, reach)
 
 
 class Tiles:
-    """A mesh's triangles by tile and level."""
+    """Meshes whose triangles are sorted into square tiles."""
 
     def __init__(self, parts: Sequence[tuple[Mesh, Level]]) -> None:
+        parts = [(m, level) for m, level in parts if len(m.triangles)]
         offsets = np.cumsum([0, *(len(m.vertices) for m, _ in parts)])
         self.vertices = np.concatenate([m.vertices for m, _ in parts])
         triangles = np.concatenate([m.triangles + np.uint32(o) for (m, _), o in zip(parts, offsets, strict=False)])
+        faces = _faces(self.vertices, triangles)
         level = np.concatenate([np.full(len(m.triangles), lod) for m, lod in parts])
-        corners = self.vertices["position"][triangles][..., :2]
-        cell = np.floor(corners.mean(axis=1) / TILE).astype(int)
-        key = np.column_stack((level, cell))
-        cells, inverse = np.unique(key, axis=0, return_inverse=True)
-        order = np.argsort(inverse, kind="stable")
-        bounds = np.searchsorted(inverse[order], np.arange(len(cells) + 1))
-        self.level = cells[:, 0]
-        self.center = (cells[:, 1:] + 0.5) * TILE
-        away = np.linalg.norm(corners - self.center[inverse][:, None], axis=2).max(axis=1)
-        self.reach = np.zeros(len(cells))
-        np.maximum.at(self.reach, inverse, away)
-        sorted_triangles = triangles[order].astype(np.uint32)
-        self.indices = [sorted_triangles[a:b].ravel() for a, b in zip(bounds, bounds[1:], strict=False)]
+        tile = np.column_stack((level, np.floor(faces.middles / CELL).astype(int)))
+        tile[faces.reach > EVERYWHERE] = -1, 0, 0
+        self.tiles, which = np.unique(tile, axis=0, return_inverse=True)
+        order = np.argsort(which, kind="stable")
+        self.bounds = np.searchsorted(which[order], np.arange(len(self.tiles) + 1))
+        self.faces = faces.take(order)
+        self._remembered: dict[object, _Faces] = {}
 
-    def visible(self, view: View, detail: float = DETAIL, far: float = FAR) -> NDArray[np.uint32]:
-        """Vertex indices of the triangles in view, from near to far."""
-        distance = np.hypot(*(self.center - view.eye).T)
-        shown = view.sees(self.center, self.reach) & (distance - self.reach < far)
-        shown &= (self.level == Level.ALWAYS) | ((self.level == Level.NEAR) == (distance < detail))
+    def visible(
+        self, view: View, place: object, seen: Callable[[], Cells | None], center: NDArray[np.float64], detail: float, far: float
+    ) -> NDArray[np.uint32]:
+        """Triangles (N, 3) in view that face the eye. seen: the cells in sight of the place, None for all."""
+        if place not in self._remembered:
+            if len(self._remembered) >= KEPT:
+                self._remembered.pop(next(iter(self._remembered)))
+            self._remembered[place] = self._near(seen(), center, detail, far)
+        faces = self._remembered[place]
+        front = faces.planes @ np.array((*view.eye, 1.0), np.float32) > 0
+        return faces.triangles[front & view.sees(faces.middles, faces.reach)]
+
+    def _near(self, cells: Cells | None, center: NDArray[np.float64], detail: float, far: float) -> _Faces:
+        """Faces of the tiles in sight, nearest first; those that belong to no tile come last."""
+        level = self.tiles[:, 0]
+        distance = np.hypot(*((self.tiles[:, 1:] + 0.5) * CELL - center).T)
+        shown = (distance < far) & ((level == Level.ALWAYS) | ((level == Level.NEAR) == (distance < detail)))
+        if cells is not None:
+            shown &= np.isin(_key(self.tiles[:, 1:]), _key(cells))
+        shown |= level < 0
+        distance[level < 0] = np.inf
         chosen = np.flatnonzero(shown)
         chosen = chosen[np.argsort(distance[chosen], kind="stable")]
-        return np.concatenate([self.indices[k] for k in chosen]) if len(chosen) else np.zeros(0, np.uint32)
+        ranges = [np.arange(self.bounds[k], self.bounds[k + 1]) for k in chosen]
+        return self.faces.take(np.concatenate(ranges) if ranges else np.zeros(0, np.int64))
+
+
+def _key(cells: Cells) -> NDArray[np.int64]:
+    return np.asarray(cells[:, 0] * 100_003 + cells[:, 1])
