@@ -184,3 +184,20 @@ def test_every_public_name_is_there() -> None:
     assert all(getattr(caldrive, name) is not None for name in caldrive.__all__)
     with pytest.raises(AttributeError, match="caldrive has no 'Car'"):
         caldrive.Car  # noqa: B018
+
+
+def test_what_is_collected_can_be_trained_on_and_the_result_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import caldrive.config
+
+    small = caldrive.config.TrainingConfig(steps=2, batch=2, window=3, save_every=1)
+    monkeypatch.setitem(caldrive.config.TRAININGS, "small", small)
+    recording, training = tmp_path / "recording", tmp_path / "training"
+    found = run_json(
+        *("collect", "--out", str(recording), "--episodes", "2", "--duration", "1", "--workers", "1"),
+    )
+    assert sum(found["counts"]["hazard_stop"].values()) == 2 * 10 * 3  # episodes, moments, cameras
+    model = run_json("train", "--data", str(recording), "--out", str(training))["model"]
+    driven = run_json(*DRIVE, "--model", model, "--seconds", "1", "--no-video", "--out", str(tmp_path / "drive"))
+    assert driven["episodes"][0]["duration"] == pytest.approx(1.0)

@@ -169,17 +169,17 @@ class TrainingConfig:
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu or cuda.
     """
 
-    steps: int = 4000
-    batch: int = 32
-    window: int = 4
+    steps: int = 1600
+    batch: int = 12
+    window: int = 6
     learning_rate: float = 1e-3
-    warm_up: int = 200
+    warm_up: int = 100
     final_rate: float = 0.02
     clip: float = 5.0
     balance: float = 0.5
     augment: bool = True
     validation_share: float = 0.05
-    evaluate_every: int = 500
+    evaluate_every: int = 400
     save_every: int = 100
     cache_gb: float = 4.0
     precision: str = "auto"

@@ -52,7 +52,7 @@ def class_counts(folder: Path | str) -> dict[str, dict[str, int]]:
     found = {}
     for name in names:
         values, counts = np.unique(np.concatenate([c[name] for c in columns]), return_counts=True)
-        found[name] = {str(v.item()): int(n) for v, n in zip(values, counts, strict=True)}
+        found[name] = {str(v): int(n) for v, n in zip(values, counts, strict=True)}
     return found
 
 

@@ -49,7 +49,7 @@ class TownBatch:
 class Crowd:
     """Instances of one mesh."""
 
-    def __init__(self, mesh: Mesh, most: int = 512) -> None:
+    def __init__(self, mesh: Mesh, most: int = 1024) -> None:
         gl = gl_context()
         self.most = most
         self.buffer = gl.buffer(reserve=most * INSTANCE.itemsize, dynamic=True)

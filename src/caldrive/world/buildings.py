@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
 from caldrive.geometry import box_corners
-from caldrive.world.meshes import RGB, Mesh, merge, quads
+from caldrive.world.meshes import RGB, Detail, Mesh, merge, quads
 from caldrive.world.scenery import STYLES, Prop
 from caldrive.world.textures import Tex
 
@@ -60,12 +60,15 @@ def _walls(
     following = np.roll(corners, -1, axis=1)
     bays = np.maximum(1, np.rint(np.linalg.norm(following - corners, axis=2) / BAY * 2)) / 2
     z0, z1 = (np.broadcast_to(z[:, None, None], (*corners.shape[:2], 1)) for z in (low, high))
-    faces = np.stack([np.concatenate(p, 2) for p in ((corners, z0), (following, z0), (following, z1), (corners, z1))], 2)
+    faces = np.stack(
+        [np.concatenate(p, 2) for p in ((corners, z0), (following, z0), (following, z1), (corners, z1))], 2
+    )
     uv = np.zeros((*corners.shape[:2], 4, 3))
     uv[..., 1:3, 0] = bays[..., None]
     uv[..., 2:, 1] = tiles_high[:, None, None]
     uv[..., 2] = layer[:, None, None]
-    return quads(faces.reshape(-1, 4, 3), np.repeat(tint, 4, axis=0), uv.reshape(-1, 4, 3), spare=FULL)
+    made = quads(faces.reshape(-1, 4, 3), np.repeat(tint, 4, axis=0), uv.reshape(-1, 4, 3), spare=FULL)
+    return Mesh(made.vertices, made.triangles, np.repeat(corners.mean(axis=1), 8, axis=0))
 
 
 def _roofs(corners: NDArray[np.float64], height: NDArray[np.float64], designs: Sequence[Design]) -> Mesh:
@@ -79,9 +82,9 @@ def _roofs(corners: NDArray[np.float64], height: NDArray[np.float64], designs: S
     tops = [np.column_stack((p, height + rise)) for p in (ridge_left + inset, ridge_right - inset)]
     eaves = np.concatenate((out, np.broadcast_to((height - 0.02)[:, None, None], (*out.shape[:2], 1))), axis=2)
     a, b, c, d = (eaves[:, k] for k in range(4))
-    faces = np.stack(
-        [np.stack(f, 1) for f in ((b, c, tops[1], tops[0]), (d, a, tops[0], tops[1]), (a, b, tops[0], tops[0]), (c, d, tops[1], tops[1]))], 1
-    )  # fmt: skip
+    left, right = tops
+    slopes = (b, c, right, left), (d, a, left, right), (a, b, left, left), (c, d, right, right)
+    faces = np.stack([np.stack(f, axis=1) for f in slopes], axis=1)
     uv = np.zeros((len(corners), 4, 4, 3))
     uv[..., 1:3, 0], uv[..., 2:, 1] = 3.0, 1.5
     uv[..., 2] = np.array([d.roof for d in designs])[:, None, None]
@@ -98,24 +101,24 @@ def _eaves(corners: NDArray[np.float64], height: NDArray[np.float64], designs: S
     return _walls(out, height - 0.3, height + 0.02, plain, tint.astype(int), np.ones(len(corners)))
 
 
-def building_mesh(props: Sequence[Prop], style: str) -> Mesh:
-    """All buildings among the props as one mesh."""
+def building_meshes(props: Sequence[Prop], style: str) -> Detail:
+    """All buildings among the props; from afar their ground floors look like the others."""
     houses = [p for p in props if p.kind == "building"]
     if not houses:
-        return merge(())
+        return Detail()
     designs = [DESIGNS[style][p.variant] for p in houses]
-    # counter-clockwise from front right, so that the walls look outwards
+    # from front right counter-clockwise, so that the walls look outwards
     footprints: list[Points] = [np.roll(box_corners(p.pose, p.length, p.width), 1, axis=0) for p in houses]
     corners, height = np.array(footprints), np.array([p.height for p in houses])
     floor = STYLES[style].floor
-    low = np.full(len(houses), -0.06)
-    first = np.full(len(houses), floor)
-    return merge((
-        _walls(corners, low, first, *_looks(designs, "ground", "base"), np.ones(len(houses))),
-        _walls(corners, first, height, *_looks(designs, "upper", "tint"), (height - floor) / floor / 2),
-        _roofs(corners, height, designs),
-        _eaves(corners, height, designs),
-    ))  # fmt: skip
+    low, first = np.full(len(houses), -0.06), np.full(len(houses), floor)
+    upper = _looks(designs, "upper", "tint")
+    ground_floor = _walls(corners, low, first, *_looks(designs, "ground", "base"), np.ones(len(houses)))
+    floors = _walls(corners, first, height, *upper, (height - floor) / floor / 2)
+    far = _walls(corners, low, height, *upper, height / floor / 2)
+    return Detail(
+        _roofs(corners, height, designs), merge((ground_floor, floors, _eaves(corners, height, designs))), far
+    )
 
 
 def _looks(designs: Sequence[Design], layer: str, tint: str) -> tuple[NDArray[np.int_], NDArray[np.int_]]:

@@ -1,14 +1,12 @@
 """Cars as low-poly meshes, lofted from cross-sections; length and width are scaled to the real ones when drawn.
 
-Slots: 0 takes the vertex colour, 1 the paint, 2 and 3 the colours of tail and head lamps, 5 is glass in the vertex colour.
+Slots: 0 takes the vertex colour, 1 the paint, 2 and 3 the colours of tail and head lamps, 5 is glass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from caldrive.world.meshes import RGB, Mesh, box, disc, merge, quads
 
@@ -23,7 +21,7 @@ _SILL = 0.24  # m above the road
 
 @dataclass(frozen=True)
 class Shape:
-    """A car's side view: (x, height of the shoulder, height of the roof) from front to back; equal heights mean no cabin."""
+    """A car's side view: (x, height of the shoulder, height of the roof) from front to back; equal: no cabin there."""
 
     sections: tuple[tuple[float, float, float], ...]
     roof_width: float
@@ -54,10 +52,15 @@ def _panels(shape: Shape) -> list[Mesh]:
         lower, upper, top = [], [], []
         for y in (1, -1):
             side = [(x0, y * half, _SILL), (x1, y * half, _SILL), (x1, y * half, s1 - 0.06), (x0, y * half, s0 - 0.06)]
-            bevel = [(x0, y * half, s0 - 0.06), (x1, y * half, s1 - 0.06), (x1, y * half * 0.94, s1), (x0, y * half * 0.94, s0)]
+            bevel = [
+                (x0, y * half, s0 - 0.06),
+                (x1, y * half, s1 - 0.06),
+                (x1, y * half * 0.94, s1),
+                (x0, y * half * 0.94, s0),
+            ]
             window = [(x0, y * half * 0.94, s0), (x1, y * half * 0.94, s1), (x1, y * w1, r1), (x0, y * w0, r0)]
-            lower += [f[:: -y] for f in (side, bevel)]
-            upper.append(window[:: -y])
+            lower += [f[::y] for f in (side, bevel)]
+            upper.append(window[::y])
         top = [[(x0, -w0, r0), (x0, w0, r0), (x1, w1, r1), (x1, -w1, r1)]]
         parts += [quads(lower, (255, 255, 255), slot=PAINT), quads(upper, _GLASS, slot=GLASS)]
         parts.append(quads(top, _GLASS, slot=GLASS) if sloped else quads(top, (255, 255, 255), slot=PAINT))
@@ -78,8 +81,14 @@ def _ends(shape: Shape) -> list[Mesh]:
     """Lamps, grille, bumpers and number plates."""
     front, back = shape.sections[0], shape.sections[-1]
     x0, x1, high = front[0] + 0.015, back[0] - 0.015, back[1]
-    parts = [_lamp(x0, 0.0, front[1] - 0.17, (0.8, 0.16), (28, 28, 30), 0), _lamp(x0, 0.0, 0.32, (1.5, 0.12), (44, 44, 46), 0)]
-    parts += [_lamp(x1, 0.0, 0.32, (1.6, 0.16), (44, 44, 46), 0), _lamp(x1, 0.0, high - 0.22, (0.5, 0.13), (232, 226, 190), 0)]
+    parts = [
+        _lamp(x0, 0.0, front[1] - 0.17, (0.8, 0.16), (28, 28, 30), 0),
+        _lamp(x0, 0.0, 0.32, (1.5, 0.12), (44, 44, 46), 0),
+    ]
+    parts += [
+        _lamp(x1, 0.0, 0.32, (1.6, 0.16), (44, 44, 46), 0),
+        _lamp(x1, 0.0, high - 0.22, (0.5, 0.13), (232, 226, 190), 0),
+    ]
     for y in (-0.64, 0.64):
         parts.append(_lamp(x0, y, front[1] - 0.13, (0.34, 0.17), (255, 255, 255), HEAD, GLOWING))
         parts.append(_lamp(x1, y, high - 0.17, (0.32, 0.24), (255, 255, 255), TAIL, GLOWING))
@@ -104,8 +113,13 @@ def _pillars(shape: Shape) -> list[Mesh]:
     middle, half, roof = (x0 + x1) / 2, WIDTH / 2 * 0.945, WIDTH / 2 * (shape.roof_width + 0.006)
     parts = []
     for y in (1, -1):
-        corners = [(middle + 0.06, y * half, s0), (middle - 0.06, y * half, s0), (middle - 0.06, y * roof, r0), (middle + 0.06, y * roof, r0)]
-        parts.append(quads([corners[::-y]], (255, 255, 255), slot=PAINT))
+        corners = [
+            (middle + 0.06, y * half, s0),
+            (middle - 0.06, y * half, s0),
+            (middle - 0.06, y * roof, r0),
+            (middle + 0.06, y * roof, r0),
+        ]
+        parts.append(quads([corners[::y]], (255, 255, 255), slot=PAINT))
         parts.append(box((x0 + 0.4, y * 0.98, s0 + 0.1), (0.12, 0.2, 0.14), (255, 255, 255), slot=PAINT))
     return parts
 
@@ -117,7 +131,10 @@ def car_mesh(shape: Shape) -> Mesh:
 
 def far_car_mesh(shape: Shape) -> Mesh:
     """The same car seen from afar, about 60 triangles: body, windows, lamps and the dark between the wheels."""
-    tyres = [box((x, 0, shape.wheel * 0.75), (2 * shape.wheel * 0.85, WIDTH + 0.02, shape.wheel * 1.5), _TYRE) for x in shape.axles]
+    tyres = [
+        box((x, 0, shape.wheel * 0.75), (2 * shape.wheel * 0.85, WIDTH + 0.02, shape.wheel * 1.5), _TYRE)
+        for x in shape.axles
+    ]
     return merge((*_panels(shape), *(m for m in _ends(shape) if m.vertices["slot"][0] in (TAIL, HEAD)), *tyres))
 
 
@@ -126,15 +143,19 @@ def _rgb(*hexes: int) -> tuple[RGB, ...]:
 
 
 PAINTS: Sequence[RGB] = _rgb(
-    0xB82626, 0x2A4E9A, 0xE6E6E2, 0x2B2D31, 0x9AA0A6, 0x3E7A52, 0xD8A62A, 0x6C2A3C, 0x5A8CC0, 0xC86A2C, 0x707A6A, 0xD9CFB8
+    0xB82626,
+    0x2A4E9A,
+    0xE6E6E2,
+    0x2B2D31,
+    0x9AA0A6,
+    0x3E7A52,
+    0xD8A62A,
+    0x6C2A3C,
+    0x5A8CC0,
+    0xC86A2C,
+    0x707A6A,
+    0xD9CFB8,
 )
-
-
-def tail_color(stands: bool) -> RGB:
-    """Colour of the tail lamps: bright while a car brakes or stands."""
-    return (255, 52, 40) if stands else (150, 22, 22)
-
-
-def paint_of(seed: int) -> np.ndarray:
-    """The paint (3,) that belongs to a seed."""
-    return np.array(PAINTS[seed % len(PAINTS)], dtype=np.uint8)
+TAIL_LAMP: RGB = (150, 22, 22)
+BRAKE_LAMP: RGB = (255, 52, 40)
+HEAD_LAMP: RGB = (238, 236, 222)

@@ -1,34 +1,23 @@
-"""Trees, posts, signs and street furniture as meshes: one template for each kind and variant, copied to where it stands."""
+"""Trees, posts, signs and street furniture: a template for each kind and variant, copied to where it stands."""
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from caldrive.world.meshes import RGB, Mesh, box, disc, lathe, merge, packed, quads, smooth
+from caldrive.world.meshes import RGB, Detail, Mesh, box, disc, lathe, merge, packed, quads, smooth
 from caldrive.world.scenery import Prop
 from caldrive.world.textures import SIGN_LAYERS, Tex
 
 LAMPS = {"red": 3.16, "yellow": 2.82, "green": 2.48}  # m above the ground
 LAMP_RADIUS = 0.155
 LAMP_FACE = -0.2  # m ahead of the post's middle: the side that the traffic sees
-SIGN_HEIGHT, SIGN_RADIUS = 2.1, 0.45
+SIGN_HEIGHT, SIGN_RADIUS = 2.1, 0.5
 TREE_HEIGHT = 6.0  # m, of the templates
 _POLE: RGB = (132, 136, 140)
 _DARK: RGB = (34, 36, 38)
-
-
-@dataclass(frozen=True)
-class Detail:
-    """A template's parts: always drawn, only from near, only from afar."""
-
-    always: Mesh = merge(())
-    near: Mesh = merge(())
-    far: Mesh = merge(())
 
 
 def _pole(height: float, radius: float, color: RGB = _POLE, n: int = 5) -> Mesh:
@@ -37,18 +26,27 @@ def _pole(height: float, radius: float, color: RGB = _POLE, n: int = 5) -> Mesh:
 
 def _light_post() -> Detail:
     """The mast, a black plate with a light rim, and three dark lenses; the camera adds the lit one."""
-    plate = box((0.0, 0, 2.82), (0.05, 0.66, 1.30), (226, 226, 222))
-    face = box((-0.04, 0, 2.82), (0.06, 0.58, 1.22), _DARK)
+    mast, grey = _pole(2.3, 0.07, (86, 90, 94), 3), (226, 226, 222)
+    y, z0, z1 = 0.29, 2.21, 3.43
+    face = quads([[(-0.04, y, z0), (-0.04, -y, z0), (-0.04, -y, z1), (-0.04, y, z1)]], _DARK)
     housing = box((-0.11, 0, 2.82), (0.16, 0.40, 1.08), (26, 27, 29))
     dark = {"red": (74, 22, 22), "yellow": (76, 62, 20), "green": (20, 62, 34)}
     lenses = [disc((LAMP_FACE - 0.005, 0, z), LAMP_RADIUS, 8, dark[name], -1) for name, z in LAMPS.items()]
-    return Detail(merge((_pole(2.3, 0.07, (86, 90, 94)), plate, face, housing)), merge(lenses))
+    always = (mast, box((0.0, 0, 2.82), (0.05, 0.66, 1.30), grey), face)
+    return Detail(merge(always), merge((housing, *lenses)))
 
 
 def _sign_post(limit: int) -> Detail:
-    front = disc((-0.07, 0, SIGN_HEIGHT), SIGN_RADIUS, 16, (255, 255, 255), -1, SIGN_LAYERS[limit])
-    back = disc((-0.05, 0, SIGN_HEIGHT), SIGN_RADIUS, 8, (118, 120, 122), 1)
-    return Detail(merge((_pole(2.5, 0.045), front, back)))
+    near, far = (
+        merge(
+            (
+                _pole(2.1, 0.045, n=sides),
+                disc((-0.07, 0, SIGN_HEIGHT), SIGN_RADIUS, n, (255, 255, 255), -1, SIGN_LAYERS[limit], slot=1),
+            )
+        )
+        for sides, n in ((4, 16), (3, 8))
+    )
+    return Detail(disc((-0.05, 0, SIGN_HEIGHT), SIGN_RADIUS, 6, (118, 120, 122), 1), near, far)
 
 
 def _uneven(mesh: Mesh, strength: float) -> Mesh:
@@ -65,29 +63,37 @@ def _crown(profile: Sequence[tuple[float, float]], color: RGB, layer: Tex, n: in
     return smooth(_uneven(made, dents), (0, 0, middle - 0.4), 0.8)
 
 
+_GREEN_BARK, _DARK_BARK = (104, 84, 66), (84, 66, 54)
 _CROWNS: dict[tuple[str, int], tuple[tuple[tuple[float, float], ...], RGB, Tex, RGB]] = {
-    ("town01", 0): (((0.3, 2.3), (1.5, 3.1), (1.75, 4.3), (1.1, 5.5), (0.0, 6.0)), (98, 142, 62), Tex.LEAVES, (104, 84, 66)),
-    ("town01", 1): (((0.4, 2.5), (1.2, 3.0), (1.55, 4.0), (1.2, 5.2), (0.0, 5.9)), (126, 158, 70), Tex.LEAVES, (112, 94, 76)),
-    ("town01", 2): (((0.2, 1.9), (0.75, 2.7), (0.95, 4.0), (0.6, 5.4), (0.0, 6.2)), (82, 126, 64), Tex.LEAVES, (96, 80, 64)),
-    ("town02", 0): (((0.2, 1.5), (1.35, 1.9), (0.95, 3.4), (0.5, 4.8), (0.0, 6.0)), (58, 98, 78), Tex.NEEDLES, (84, 66, 54)),
-    ("town02", 1): (((0.2, 1.2), (1.0, 1.7), (0.75, 3.4), (0.4, 5.0), (0.0, 6.2)), (70, 110, 80), Tex.NEEDLES, (84, 66, 54)),
-    ("town02", 2): (((0.3, 2.6), (1.2, 3.1), (1.4, 4.2), (0.9, 5.3), (0.0, 5.8)), (206, 142, 58), Tex.LEAVES, (196, 190, 180)),
+    ("town01", 0): (
+        ((0.3, 2.3), (1.5, 3.1), (1.75, 4.3), (1.1, 5.5), (0.0, 6.0)), (98, 142, 62), Tex.LEAVES, _GREEN_BARK),
+    ("town01", 1): (
+        ((0.4, 2.5), (1.2, 3.0), (1.55, 4.0), (1.2, 5.2), (0.0, 5.9)), (126, 158, 70), Tex.LEAVES, (112, 94, 76)),
+    ("town01", 2): (
+        ((0.2, 1.9), (0.75, 2.7), (0.95, 4.0), (0.6, 5.4), (0.0, 6.2)), (82, 126, 64), Tex.LEAVES, _GREEN_BARK),
+    ("town02", 0): (
+        ((0.2, 1.5), (1.35, 1.9), (0.95, 3.4), (0.5, 4.8), (0.0, 6.0)), (58, 98, 78), Tex.NEEDLES, _DARK_BARK),
+    ("town02", 1): (
+        ((0.2, 1.2), (1.0, 1.7), (0.75, 3.4), (0.4, 5.0), (0.0, 6.2)), (70, 110, 80), Tex.NEEDLES, _DARK_BARK),
+    ("town02", 2): (
+        ((0.3, 2.6), (1.2, 3.1), (1.4, 4.2), (0.9, 5.3), (0.0, 5.8)), (206, 142, 58), Tex.LEAVES, (196, 190, 180)),
 }  # fmt: skip
 
 
 def _tree(style: str, variant: int) -> Detail:
     profile, color, layer, bark = _CROWNS[style, variant]
-    trunk = lathe(((0.17, -0.06), (0.12, profile[1][1])), 4, bark, spare=255)
+    trunk = lathe(((0.17, -0.06), (0.12, profile[1][1])), 3, bark, spare=255)
     dents = 0.10 if layer is Tex.LEAVES else 0.0
     rough = (profile[0], profile[2] if layer is Tex.LEAVES else profile[1], profile[-1])
-    return Detail(trunk, _crown(profile, color, layer, 7, dents), _crown(rough, color, layer, 5, 0.0))
+    return Detail(trunk, _crown(profile, color, layer, 7, dents), _crown(rough, color, layer, 4, 0.0))
 
 
 def _lamp(style: str) -> Detail:
     if style == "town02":
-        return Detail(merge((_pole(6.0, 0.07, (70, 74, 80), 4), box((0.9, 0, 6.0), (1.9, 0.22, 0.1), (70, 74, 80)))))
+        arm = box((0.9, 0, 6.0), (1.9, 0.22, 0.1), (70, 74, 80))
+        return Detail(_pole(6.0, 0.07, (70, 74, 80), 3), arm, arm)
     lantern = lathe(((0.09, 4.0), (0.24, 4.5), (0.0, 4.8)), 5, (52, 60, 54))
-    return Detail(merge((_pole(4.0, 0.06, (52, 60, 54), 4), lantern)))
+    return Detail(_pole(4.0, 0.06, (52, 60, 54), 3), lantern, lathe(((0.09, 4.0), (0.24, 4.5)), 3, (52, 60, 54)))
 
 
 def _bench() -> Mesh:
@@ -122,7 +128,15 @@ def _template(kind: str, variant: int, label: int, style: str) -> Detail:
     if kind == "hedge":
         return Detail(box((0, 0, 0.62), (0.9, 7.0, 1.36), (86, 122, 62), Tex.LEAVES, 2.0))
     if kind == "fence":
-        return Detail(box((0, 0, 0.7), (0.08, 8.0, 1.5), (206, 196, 176) if style == "town01" else (120, 124, 128), Tex.BRICKS, 3.0))
+        return Detail(
+            box(
+                (0, 0, 0.7),
+                (0.08, 8.0, 1.5),
+                (206, 196, 176) if style == "town01" else (120, 124, 128),
+                Tex.BRICKS,
+                3.0,
+            )
+        )
     if kind == "wall":
         return Detail(box((0, 0, 0.95), (0.3, 8.0, 2.0), (176, 160, 150), Tex.BRICKS, 2.4))
     if kind == "container":
@@ -142,13 +156,15 @@ def copies(mesh: Mesh, props: Sequence[Prop], foot: float, scales: Sequence[floa
     heading = np.array([p.pose.heading for p in props])
     c, s = np.cos(heading), np.sin(heading)
     zero, one = np.zeros(n), np.ones(n)
-    turn = np.stack((np.stack((c, s, zero), 1), np.stack((-s, c, zero), 1), np.stack((zero, zero, one), 1)), 1)  # row vectors
+    turn = np.stack(
+        (np.stack((c, s, zero), 1), np.stack((-s, c, zero), 1), np.stack((zero, zero, one), 1)), 1
+    )  # row vectors
     made = np.tile(mesh.vertices, (n, 1))
     at = np.array([(p.pose.x, p.pose.y, foot) for p in props])
     made["position"] = np.asarray(scales)[:, None, None] * (made["position"] @ turn) + at[:, None]
     made["normal"] = packed((made["normal"] - 128.0) / 127 @ turn)
     triangles = mesh.triangles[None] + (v * np.arange(n, dtype=np.uint32))[:, None, None]
-    return Mesh(made.reshape(-1), triangles.reshape(-1, 3))
+    return Mesh(made.reshape(-1), triangles.reshape(-1, 3), np.repeat(at[:, :2], len(mesh.triangles), axis=0))
 
 
 def furniture_meshes(props: Sequence[Prop], style: str, foot: float) -> Detail:
@@ -157,7 +173,7 @@ def furniture_meshes(props: Sequence[Prop], style: str, foot: float) -> Detail:
     for prop in props:
         if prop.kind != "building":
             groups[prop.kind, prop.variant, prop.label].append(prop)
-    always, near, far = [], [], []
+    always, near, far = list[Mesh](), list[Mesh](), list[Mesh]()
     for (kind, variant, label), members in groups.items():
         detail = _template(kind, variant, label, style)
         scales = [p.height / TREE_HEIGHT if kind == "tree" else 1.0 for p in members]

@@ -1,14 +1,16 @@
 """The ground: lane strips with their markings, junctions, kerbs, sidewalks and the yards behind them.
 
-The lines themselves are drawn by the road shader; a strip carries what it needs: uv = (metres left of the lane's middle,
-dashes travelled along its left line, metres to the stop line), color = (kind of the left line, kind of the right line,
-half width in units of 2 cm).
+The lines themselves are drawn by the road shader; a strip carries what it needs: uv = (metres left of the lane's
+middle, dashes travelled along its left line, metres to the stop line), color = (kind of the left line, kind of the right
+line, half width in units of 2 cm).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -21,6 +23,7 @@ from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.streets import Border, Chain, chains
 from caldrive.world.textures import Tex
 
+Look = tuple[RGB, Tex]
 KERB_HEIGHT = 0.12
 KERB_WIDTH = 0.2
 SOLID_NEAR_JUNCTION = 18.0  # m
@@ -32,7 +35,7 @@ LONGEST = 24.0  # m of one piece of ground, so that what lies out of sight is le
 
 @dataclass(frozen=True)
 class GroundStyle:
-    """Colours and layers of a town's ground: (layer, tint, metres of one tile). dash: metres of one dash and one gap."""
+    """Colours and layers of the ground: (layer, tint, metres of one tile). dash: metres of one dash and one gap."""
 
     dash: float
     kerb: RGB
@@ -54,13 +57,13 @@ def _normals(points: Points) -> Points:
     before, after = np.vstack((left[:1], left)), np.vstack((left, left[-1:]))
     if np.allclose(points[0], points[-1]):
         before[0], after[-1] = left[-1], left[0]
-    return (before + after) / np.maximum(1 + (before * after).sum(1), 0.3)[:, None]
+    return np.asarray((before + after) / np.maximum(1 + (before * after).sum(1), 0.3)[:, None])
 
 
 def _resampled(line: Polyline, cuts: tuple[float, ...] = ()) -> tuple[NDArray[np.float64], Points]:
-    """Arc lengths and points of a line, with more points at the cuts and wherever they lie further apart than LONGEST."""
+    """Arc lengths and points of a line, with more points at the cuts and wherever they lie too far apart."""
     s = np.unique(np.round(np.concatenate((line.s, [c for c in cuts if 0.5 < c < line.length - 0.5])), 3))
-    pieces = [np.linspace(a, b, math.ceil((b - a) / LONGEST), endpoint=False) for a, b in zip(s, s[1:], strict=False)]
+    pieces = [np.linspace(a, b, math.ceil((b - a) / LONGEST), endpoint=False) for a, b in pairwise(s)]
     at = np.append(np.concatenate(pieces), s[-1])
     return at, np.stack([np.interp(at, line.s, line.points[:, k]) for k in (0, 1)], axis=1)
 
@@ -115,31 +118,40 @@ def road_mesh(roads: RoadNetwork) -> Mesh:
     return merge((*(_strip(c, dash) for c in streets), _junctions(roads, streets)))
 
 
-def _kerb_and_sidewalk(ring: shapely.LinearRing, style: GroundStyle) -> Mesh:
-    """Kerb face, kerb top and sidewalk along one edge of the roadway, which lies to the ring's left."""
+def _bands(ring: shapely.LinearRing, lines: Sequence[tuple[float, float]], looks: Sequence[Look], tile: float) -> Mesh:
+    """Strips along an edge of the roadway, which lies to the ring's left, between lines (metres from it, height)."""
     s, points = _resampled(Polyline(shapely.get_coordinates(ring)))
     away = -_normals(points)
-    layer, tint, tile = style.pavement
-    lines = [(0.0, -0.02), (0.0, KERB_HEIGHT), (KERB_WIDTH, KERB_HEIGHT), (SIDEWALK_WIDTH, KERB_HEIGHT)]
     rows = [np.column_stack((points + d * away, np.full(len(points), z))) for d, z in lines]
     parts = []
-    for i, (color, texture) in enumerate(((style.kerb, Tex.PLAIN), (style.kerb, Tex.PLAIN), (tint, layer))):
-        low, high = rows[i], rows[i + 1]
+    for low, high, (color, texture), (near, _), (far, _) in zip(rows, rows[1:], looks, lines, lines[1:], strict=False):
         uv = np.zeros((len(s) - 1, 4, 3))
         uv[..., 0] = np.stack((s[:-1], s[1:], s[1:], s[:-1]), axis=1) / tile
-        uv[:, :2, 1] = SIDEWALK_WIDTH / tile
+        uv[..., 1] = np.array((far, far, near, near)) / tile
         uv[..., 2] = texture
-        corners = np.stack((high[:-1], high[1:], low[1:], low[:-1]), axis=1)
-        parts.append(quads(corners, color, uv))
+        parts.append(quads(np.stack((high[:-1], high[1:], low[1:], low[:-1]), axis=1), color, uv))
     return merge(parts)
 
 
-def ground_mesh(roads: RoadNetwork) -> Mesh:
-    """Kerbs and sidewalks, and one wide yard under everything."""
+def _edges(roads: RoadNetwork, tolerance: float) -> list[shapely.LinearRing]:
+    area = shapely.orient_polygons(roads.roadway.simplify(tolerance))
+    return [ring for p in shapely.get_parts(area) for ring in (p.exterior, *p.interiors)]
+
+
+def kerb_mesh(roads: RoadNetwork) -> Mesh:
+    """Kerbs and sidewalks as seen from near."""
     style = GROUND_STYLES[roads.style]
-    area = shapely.orient_polygons(roads.roadway.simplify(0.015))
-    rings = [ring for p in shapely.get_parts(area) for ring in (p.exterior, *p.interiors)]
-    return merge([_kerb_and_sidewalk(ring, style) for ring in rings])
+    layer, tint, tile = style.pavement
+    lines = ((0.0, -0.02), (0.0, KERB_HEIGHT), (KERB_WIDTH, KERB_HEIGHT), (SIDEWALK_WIDTH, KERB_HEIGHT))
+    looks = ((style.kerb, Tex.PLAIN), (style.kerb, Tex.PLAIN), (tint, layer))
+    return merge([_bands(ring, lines, looks, tile) for ring in _edges(roads, 0.02)])
+
+
+def far_kerb_mesh(roads: RoadNetwork) -> Mesh:
+    """The same as seen from afar: one slope, so low that kerbs and sidewalks lie on it where they are drawn."""
+    layer, tint, tile = GROUND_STYLES[roads.style].pavement
+    lines = ((0.0, -0.015), (SIDEWALK_WIDTH, KERB_HEIGHT - 0.03))
+    return merge([_bands(ring, lines, ((tint, layer),), tile) for ring in _edges(roads, 0.2)])
 
 
 def yard_mesh(roads: RoadNetwork, margin: float = 600.0) -> Mesh:

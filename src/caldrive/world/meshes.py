@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caldrive.datatypes import Pose
 
-# uv: texture coordinates and layer. normal: 128 + 127 times x, y, z; slot: which part it is. color: RGB; spare: see shaders.
+# uv: texture coordinates and layer. normal: 128 + 127 times x, y, z. slot: which part it is. spare: see the shaders.
 VERTEX = np.dtype(
     [("position", "3f4"), ("uv", "3f4"), ("normal", "3u1"), ("slot", "u1"), ("color", "3u1"), ("spare", "u1")]
 )
@@ -22,11 +23,29 @@ RGB = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Mesh:
+    """owners (N, 2): the place of the thing that each triangle is part of, where parts must come and go together."""
+
     vertices: Vertices
     triangles: Triangles
+    owners: NDArray[np.float64] | None = None
+
+    def places(self) -> NDArray[np.float64]:
+        """Owners, or the triangles' own middles (N, 2)."""
+        if self.owners is not None:
+            return self.owners
+        return np.asarray(self.vertices["position"][self.triangles][..., :2].mean(axis=1), dtype=float)
 
 
 EMPTY = Mesh(np.zeros(0, VERTEX), np.zeros((0, 3), np.uint32))
+
+
+@dataclass(frozen=True)
+class Detail:
+    """A thing's parts: always drawn, only from near, only from afar."""
+
+    always: Mesh = EMPTY
+    near: Mesh = EMPTY
+    far: Mesh = EMPTY
 
 
 def packed(normal: ArrayLike) -> NDArray[np.float64]:
@@ -41,7 +60,8 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
         return EMPTY
     offsets = np.cumsum([0, *(len(m.vertices) for m in parts[:-1])])
     triangles = [m.triangles + np.uint32(o) for m, o in zip(parts, offsets, strict=True)]
-    return Mesh(np.concatenate([m.vertices for m in parts]), np.concatenate(triangles))
+    owners = None if all(m.owners is None for m in parts) else np.concatenate([m.places() for m in parts])
+    return Mesh(np.concatenate([m.vertices for m in parts]), np.concatenate(triangles), owners)
 
 
 def quads(corners: ArrayLike, color: ArrayLike, uv: ArrayLike = (0, 0, 0), slot: int = 0, spare: int = 0) -> Mesh:
@@ -88,8 +108,8 @@ def box(
     """A box along the axes without its underside; top: how much of its width and length the upper side has."""
     (x, y, z), (a, b, c) = center, (size[0] / 2, size[1] / 2, size[2] / 2)
     footprint = np.array([(a, -b), (a, b), (-a, b), (-a, -b)])
-    low = np.column_stack((footprint + (x, y), np.full(4, z - c)))
-    high = np.column_stack((footprint * top + (x, y), np.full(4, z + c)))
+    low = np.column_stack((footprint + np.array((x, y)), np.full(4, z - c)))
+    high = np.column_stack((footprint * top + np.array((x, y)), np.full(4, z + c)))
     sides = np.stack((low, np.roll(low, -1, 0), np.roll(high, -1, 0), high), axis=1)
     uv = np.zeros((5, 4, 3))
     uv[:4, 1:3, 0] = np.array([2 * b, 2 * a, 2 * b, 2 * a])[:, None] / tile
@@ -110,7 +130,7 @@ def lathe(
 ) -> Mesh:  # fmt: skip
     """A body of revolution with n flat sides from a profile of (radius, height), from its foot upwards."""
     ring, parts = _ring(n), []
-    for (r0, z0), (r1, z1) in zip(profile[:-1], profile[1:], strict=True):
+    for (r0, z0), (r1, z1) in pairwise(profile):
         low, high = (np.column_stack((ring * r + at, np.full(n + 1, z))) for r, z in ((r0, z0), (r1, z1)))
         u = np.arange(n + 1) * max(r0, r1) * math.tau / n / tile
         uv = np.zeros((n, 4, 3))
@@ -122,8 +142,8 @@ def lathe(
 
 
 def disc(
-    center: tuple[float, float, float], radius: float, n: int, color: RGB, facing: int = 1, layer: int = 0, slot: int = 0,
-    spare: int = 0, axis: str = "x",
+    center: tuple[float, float, float], radius: float, n: int, color: RGB, facing: int = 1, layer: int = 0,
+    slot: int = 0, spare: int = 0, axis: str = "x",
 ) -> Mesh:  # fmt: skip
     """A flat disc that looks along +axis or -axis; uv cover [0, 1]², u to the right for who looks at it."""
     ring = _ring(n, math.pi / n)[:-1]

@@ -19,7 +19,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Lens:
-    """Where a picture is taken from: pose on the plane, height (m), pitch (rad, + up), horizontal view (degrees), size (px)."""
+    """Where a picture is taken from: pose, height (m), pitch (rad, + up), horizontal view (degrees), size (px)."""
 
     pose: Pose
     height: float

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from caldrive.world.meshes import RGB, Mesh, box, lathe, merge, smooth
 
 HEIGHT = 1.75
@@ -49,7 +52,10 @@ def person_mesh() -> Mesh:
 
 def far_person_mesh() -> Mesh:
     """A person seen from afar, about 50 triangles."""
-    legs = [box((0, y, 0.45), (0.2, 0.17, 0.9), _WHITE, slot=TROUSERS, spare=limb) for y, limb in ((0.1, LEFT_LEG), (-0.1, RIGHT_LEG))]
+    legs = [
+        box((0, y, 0.45), (0.2, 0.17, 0.9), _WHITE, slot=TROUSERS, spare=limb)
+        for y, limb in ((0.1, LEFT_LEG), (-0.1, RIGHT_LEG))
+    ]
     torso = box((0, 0, 1.16), (0.23, 0.52, 0.62), _WHITE, slot=UPPER)
     head = box((0, 0, 1.56), (0.2, 0.19, 0.22), _WHITE, slot=SKIN)
     return merge((*legs, torso, head, box((-0.02, 0, 1.70), (0.22, 0.21, 0.12), _WHITE, slot=HAIR)))
@@ -59,21 +65,14 @@ def _rgb(*hexes: int) -> tuple[RGB, ...]:
     return tuple(((h >> 16) & 255, (h >> 8) & 255, h & 255) for h in hexes)
 
 
-UPPERS: Sequence[RGB] = _rgb(0xC23B3B, 0x2F5AA8, 0xE8E4DA, 0x2E2E34, 0x3F8A5C, 0xE0B23C, 0x7A4A9A, 0xD9772E, 0x6FA7C7, 0xB85C88)
+UPPERS: Sequence[RGB] = _rgb(
+    0xC23B3B, 0x2F5AA8, 0xE8E4DA, 0x2E2E34, 0x3F8A5C, 0xE0B23C, 0x7A4A9A, 0xD9772E, 0x6FA7C7, 0xB85C88
+)
 LOWERS: Sequence[RGB] = _rgb(0x2B3A58, 0x26262A, 0x5A5048, 0x8A8478, 0x3C4A3A, 0x6E2E34)
 SKINS: Sequence[RGB] = _rgb(0xF0CBB0, 0xD9A883, 0xA8744E, 0x6E4630)
 HAIRS: Sequence[RGB] = _rgb(0x2A2220, 0x5A3A24, 0xB98A4A, 0x8A8683, 0x7A2E1C)
 
 
-def colors_of(seed: int) -> tuple[RGB, RGB, RGB, RGB]:
-    """Colours of upper clothes, trousers, skin and hair that belong to a seed."""
-    digits = [seed // 7**k for k in range(4)]
-    return (
-        UPPERS[digits[0] % len(UPPERS)], LOWERS[digits[1] % len(LOWERS)], SKINS[digits[2] % len(SKINS)],
-        HAIRS[digits[3] % len(HAIRS)],
-    )  # fmt: skip
-
-
-def height_of(seed: int) -> float:
+def height(seeds: NDArray[np.int64]) -> NDArray[np.float64]:
     """Between 1.6 and 1.9 m."""
-    return 1.6 + (seed // 11 % 31) / 100
+    return 1.6 + (seeds // 11 % 31) / 100

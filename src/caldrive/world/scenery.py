@@ -31,8 +31,8 @@ Floats = NDArray[np.float64]
 class Prop:
     """A thing that stands still: pose of its centre, its solid box in metres, and which of its kind it is.
 
-    A building's heading looks at the road. A tree's box is its trunk, its height includes the crown. label: the limit on
-    a speed sign, else 0.
+    A building's heading looks at the road. A tree's box is its trunk, its height includes the crown. label: the limit
+    on a speed sign, else 0.
     """
 
     kind: str
@@ -47,7 +47,7 @@ class Prop:
 
 @dataclass(frozen=True)
 class Style:
-    """What lines a town's streets. frontage, depth, tree_gap, tree_height: (least, most) metres; gap: share of empty plots."""
+    """What lines the streets. frontage, depth, tree_gap, tree_height: (least, most) metres. gap: share of empty plots."""
 
     buildings: int
     frontage: tuple[float, float]
@@ -61,8 +61,10 @@ class Style:
 
 
 STYLES = {
-    "town01": Style(6, (9, 16), (9, 12), (2, 4), 3.1, 0.15, (9, 20), (5.0, 7.5), ("hedge", "hedge", "billboard", "fence")),
-    "town02": Style(6, (12, 24), (10, 14), (2, 6), 3.4, 0.25, (12, 28), (6.0, 9.0), ("fence", "container", "billboard", "wall")),
+    "town01": Style(
+        6, (9, 16), (9, 12), (2, 4), 3.1, 0.15, (9, 20), (5.0, 7.5), ("hedge", "hedge", "billboard", "fence")),
+    "town02": Style(
+        6, (12, 24), (10, 14), (2, 6), 3.4, 0.25, (12, 28), (6.0, 9.0), ("fence", "container", "billboard", "wall")),
 }  # fmt: skip
 _SIZES = {  # length (towards the road), width, height in metres
     "lamp": (0.2, 0.2, 6.2), "bin": (0.45, 0.45, 0.95), "bench": (0.55, 1.7, 0.85), "hydrant": (0.3, 0.3, 0.75),
@@ -84,7 +86,7 @@ class _Line:
         return np.stack([np.interp(s, self.s, self.points[:, k]) for k in (0, 1)], axis=1)
 
     def places(self, s: Floats, reach: Floats) -> tuple[Points, Floats]:
-        """Middles (N, 2) of the chords from s - reach to s + reach, and the headings (N,) that look away from the road."""
+        """Middles (N, 2) of the chords from s - reach to s + reach, and headings (N,) that look away from the road."""
         a, b = self.at(np.maximum(s - reach, 0)), self.at(np.minimum(s + reach, self.length))
         d = b - a
         return (a + b) / 2, np.arctan2(-d[:, 0], d[:, 1])
@@ -96,7 +98,11 @@ def _lines(roads: RoadNetwork, distance: float) -> list[_Line]:
 
 
 def _beyond(points: Points, outward: Floats, distance: Floats) -> Points:
-    return points + distance[:, None] * np.stack((np.cos(outward), np.sin(outward)), axis=1)
+    return np.asarray(points + distance[:, None] * np.stack((np.cos(outward), np.sin(outward)), axis=1))
+
+
+def _facing_road(at: Points, outward: float) -> Pose:
+    return Pose(float(at[0]), float(at[1]), float(outward) + math.pi)
 
 
 def _boxes(center: Points, heading: Floats, length: Floats, width: Floats) -> NDArray[np.object_]:
@@ -151,7 +157,7 @@ def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> It
     chosen = np.flatnonzero(built & fits)
     chosen = chosen[_without_overlaps(_boxes(center[chosen], outward[chosen], depth[chosen], width[chosen]))]
     for i in chosen:
-        pose = Pose(*map(float, center[i]), float(outward[i]) + math.pi)
+        pose = _facing_road(center[i], outward[i])
         yield Prop("building", pose, depth[i], width[i], floors[i] * style.floor, int(variant[i]))
     houses = _boxes(center[chosen], outward[chosen], depth[chosen] + 0.5, width[chosen] + 0.5)
     empty = np.setdiff1d(np.arange(n), chosen)
@@ -159,7 +165,12 @@ def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> It
 
 
 def _in_gaps(
-    at: Points, outward: Floats, houses: shapely.Geometry, keep_off: shapely.Geometry, style: Style, rng: np.random.Generator
+    at: Points,
+    outward: Floats,
+    houses: shapely.Geometry,
+    keep_off: shapely.Geometry,
+    style: Style,
+    rng: np.random.Generator,
 ) -> Iterator[Prop]:
     kinds = [style.in_gaps[k] for k in rng.integers(len(style.in_gaps), size=len(at))]
     length, width = (np.array([_SIZES[kind][k] for kind in kinds]) for k in (0, 1))
@@ -167,11 +178,13 @@ def _in_gaps(
     shapes = _boxes(center, outward, length, width)
     free = ~shapely.intersects(houses, shapes) & ~shapely.intersects(keep_off, shapes)
     for i in np.flatnonzero(free)[_without_overlaps(shapes[free])]:
-        pose = Pose(*map(float, center[i]), float(outward[i]) + math.pi)
+        pose = _facing_road(center[i], outward[i])
         yield Prop(kinds[i], pose, *_SIZES[kinds[i]], variant=int(rng.integers(4)))
 
 
-def _along(roads: RoadNetwork, distance: float, gap: tuple[float, float], rng: np.random.Generator) -> tuple[Points, Floats]:
+def _along(
+    roads: RoadNetwork, distance: float, gap: tuple[float, float], rng: np.random.Generator
+) -> tuple[Points, Floats]:
     found = []
     for line in _lines(roads, distance):
         s = np.cumsum(_walk(line.length - gap[0] / 2, *gap, rng))
@@ -191,17 +204,20 @@ def _trees(roads: RoadNetwork, style: Style, posts: Sequence[Prop], rng: np.rand
     at, outward = _along(roads, TREE_LINE, style.tree_gap, rng)
     heights, variants = rng.uniform(*style.tree_height, len(at)), rng.integers(3, size=len(at))
     for i in np.flatnonzero(_clear(at, posts, CLEAR_OF_POSTS)):
-        pose = Pose(*map(float, at[i]), float(outward[i]) + math.pi)
+        pose = _facing_road(at[i], outward[i])
         yield Prop("tree", pose, 0.4, 0.4, float(heights[i]), int(variants[i]))
 
 
-def _furniture(roads: RoadNetwork, posts: Sequence[Prop], rng: np.random.Generator) -> Iterator[Prop]:
-    """Street lamps along the kerb; bins, benches, hydrants and boxes at the back of the sidewalk."""
-    for distance, gap, kinds in ((LAMP_LINE, (26, 34), ("lamp",)), (TREE_LINE, (14, 40), ("bin", "bench", "hydrant", "box"))):
+def _furniture(
+    roads: RoadNetwork, posts: Sequence[Prop], trees: Sequence[Prop], rng: np.random.Generator
+) -> Iterator[Prop]:
+    """Street lamps along the kerb, well away from posts; small things at the back of the sidewalk."""
+    small = ("bin", "bench", "hydrant", "box")
+    for distance, gap, kinds, clear in ((LAMP_LINE, (22, 30), ("lamp",), 12.0), (TREE_LINE, (14, 40), small, 2.5)):
         at, outward = _along(roads, distance, gap, rng)
         chosen = rng.integers(len(kinds), size=len(at))
-        for i in np.flatnonzero(_clear(at, posts, 2.5)):
-            pose = Pose(*map(float, at[i]), float(outward[i]) + math.pi)
+        for i in np.flatnonzero(_clear(at, posts, clear) & _clear(at, trees, 2.5)):
+            pose = _facing_road(at[i], outward[i])
             yield Prop(kinds[chosen[i]], pose, *_SIZES[kinds[chosen[i]]], variant=int(rng.integers(4)))
 
 
@@ -219,4 +235,4 @@ def build_scenery(roads: RoadNetwork) -> tuple[Prop, ...]:
     posts = tuple(_posts(roads))
     buildings = tuple(_buildings(roads, style, rng))
     trees = tuple(_trees(roads, style, posts, rng))
-    return (*posts, *buildings, *trees, *_furniture(roads, (*posts, *trees), rng))
+    return (*posts, *buildings, *trees, *_furniture(roads, posts, trees, rng))

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFilter
 
 from caldrive.geometry import box_corners
 from caldrive.world.scenery import Prop
@@ -53,7 +53,7 @@ def _shifted(heights: Heights, columns: int, rows: int) -> Heights:
 
 
 def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
-    """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the way's fall."""
+    """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the fall."""
     flat = float(np.hypot(sun[0], sun[1]))
     fall, shade = float(sun[2]) / flat * 255 / TALLEST, heights.copy()
     reach, step = float(heights.max()) / fall, RESOLUTION
@@ -71,10 +71,15 @@ def town_bounds(roads_bounds: tuple[float, float, float, float]) -> tuple[float,
     return x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
 
 
+def _softened(heights: Heights) -> Heights:
+    """Rounds off the steps that pixels leave along slanting edges."""
+    return np.asarray(Image.fromarray(heights).filter(ImageFilter.BoxBlur(2)))
+
+
 def shadow_heights(
     props: Sequence[Prop], bounds: tuple[float, float, float, float], sun: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
     """Shadow heights (rows, columns, 2) in units of TALLEST / 255: of buildings with trees, of buildings alone."""
     houses = cast(_drawn(props, bounds, "building"), sun)
     trees = cast(_drawn(props, bounds, "tree"), sun)
-    return np.stack((np.maximum(houses, trees), houses), axis=-1)
+    return np.stack((_softened(np.maximum(houses, trees)), _softened(houses)), axis=-1)

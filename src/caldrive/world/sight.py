@@ -52,7 +52,7 @@ class Sight:
         seen[row[inside] + 1, column[inside] + 1] = True
         seen = binary_dilation(seen, np.ones((3, 3)))  # walls that were hit, and what stands out of its own cell
         rows, columns = np.nonzero(seen)
-        return np.stack((columns, rows), axis=1) - 1 + np.rint(self.origin / CELL).astype(np.int64)
+        return np.asarray(np.stack((columns, rows), axis=1) - 1 + np.rint(self.origin / CELL).astype(np.int64))
 
     def _at(self, grid: NDArray[np.bool_], points: NDArray[np.float64], pixel: float) -> NDArray[np.bool_]:
         column, row = np.moveaxis(((points - self.origin) / pixel).astype(np.int32), -1, 0)

@@ -1,4 +1,4 @@
-"""The sky as a panorama: colours from horizon to zenith, sun, clouds and a line of hills, one picture for each weather."""
+"""The sky as a panorama: colours from horizon to zenith, sun, clouds and hills, one picture for each weather."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _clouds(w: Weather, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     rows = (np.sqrt(np.maximum(elevation[:, 0], 0.0) + 0.02) * 0.75 * COLUMNS).astype(int) % COLUMNS
     field = sum(f[rows] / 1.9**k for k, f in enumerate(fields)) / 1.6
     threshold = 0.62 - 1.35 * w.cloudiness / 100
-    return np.clip((field - threshold) / 0.45, 0, 1) * (0.35 + 0.65 * min(1.0, w.cloudiness / 50))
+    return np.asarray(np.clip((field - threshold) / 0.45, 0, 1) * (0.35 + 0.65 * min(1.0, w.cloudiness / 50)))
 
 
 def panorama(w: Weather, look: Look, town_seed: int) -> NDArray[np.uint8]:
@@ -55,7 +55,7 @@ def panorama(w: Weather, look: Look, town_seed: int) -> NDArray[np.uint8]:
 def _with_hills(sky: NDArray[np.float64], look: Look, town_seed: int) -> NDArray[np.float64]:
     azimuth, elevation = _directions()
     rng = np.random.default_rng(town_seed)
-    ridge = 0.015
+    ridge = np.full_like(azimuth, 0.015)
     for k in (2, 3, 5, 9, 17, 31):
         ridge = ridge + 0.018 / k**0.6 * np.sin(k * azimuth + rng.uniform(0, math.tau)) * rng.uniform(0.4, 1)
     hills = np.clip((np.maximum(ridge, 0.012) - elevation) / 0.01, 0, 1)[..., None]
@@ -63,14 +63,16 @@ def _with_hills(sky: NDArray[np.float64], look: Look, town_seed: int) -> NDArray
     return np.asarray(sky * (1 - hills) + color * hills)
 
 
-def dome_mesh(columns: int = 24) -> Mesh:
+def dome_mesh(columns: int = 18) -> Mesh:
     """The panorama's surface seen from inside: bands from the horizon upwards, closed at the top."""
-    bands = (LOWEST, 0.12, 0.45, HIGHEST)
+    bands = (LOWEST, 0.3, HIGHEST)
     azimuth = np.arange(columns + 1) / columns * math.tau
     rows = np.zeros((len(bands) + 1, columns + 1), VERTEX)
     for row, elevation in zip(rows, (*bands, math.pi / 2), strict=True):
         flat = RADIUS * math.cos(elevation)
-        row["position"] = np.column_stack((flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(columns + 1, RADIUS * math.sin(elevation))))
+        row["position"] = np.column_stack(
+            (flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(columns + 1, RADIUS * math.sin(elevation)))
+        )
         row["uv"][:, 0] = azimuth / math.tau
         row["uv"][:, 1] = min((elevation - LOWEST) / (HIGHEST - LOWEST), 1.0)
     a = np.arange(columns, dtype=np.uint32)

@@ -1,4 +1,4 @@
-"""Streets as the painter of markings sees them: lanes joined into chains from junction to junction, and their borders."""
+"""Streets as the painter of markings sees them: lanes joined from junction to junction, and their borders."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from caldrive.geometry import Polyline
@@ -98,7 +99,8 @@ def chains(roads: RoadNetwork) -> list[Chain]:
     for first in [*starts, *drawn]:  # the second turn takes up closed rings, which have no start
         parts = _walk(first, lanes, inside, seen)
         if parts:
-            line = Polyline(np.concatenate([p.line.points for p in parts]))
+            points = shapely.LineString(np.concatenate([p.line.points for p in parts])).simplify(0.02)
+            line = Polyline(shapely.get_coordinates(points))
             longest = max(parts, key=lambda p: p.line.length)
             left, right = beside.border(longest, 1), beside.border(longest, -1)
             found.append(Chain(line, longest.width, left, right, parts[-1].id in posts))

@@ -41,7 +41,9 @@ def paving(color: RGB, joint: float, rows: int, columns: int, rng: np.random.Gen
     shade = 1 + 0.10 * rng.uniform(-1, 1, (rows, columns))[row, column] + 0.05 * rng.uniform(-1, 1, (SIZE, SIZE))
     u, v = (x * columns + 0.5 * (row % 2)) % 1, (y * rows) % 1
     edge = np.minimum(np.minimum(u, 1 - u) / columns, np.minimum(v, 1 - v) / rows) * SIZE < 0.9
-    return np.clip(np.asarray(color) * (shade * np.where(edge, joint, 1.0))[..., None], 0, 255).astype(np.uint8)
+    return np.asarray(
+        np.clip(np.asarray(color) * (shade * np.where(edge, joint, 1.0))[..., None], 0, 255), dtype=np.uint8
+    )
 
 
 def leaves(color: RGB, rng: np.random.Generator, cells: int) -> Layer:

@@ -42,6 +42,18 @@ class Tex(IntEnum):
 
 
 SIGN_LAYERS = {30: Tex.SIGN_30, 60: Tex.SIGN_60, 90: Tex.SIGN_90}
+_FACADES = {
+    Tex.SASH: facades.sash,
+    Tex.PANE: facades.pane,
+    Tex.BALCONY: facades.balcony,
+    Tex.SHOP: facades.shop,
+    Tex.HALL: facades.hall,
+    Tex.GLASS: facades.glass,
+    Tex.BAND: facades.band,
+    Tex.LOFT: facades.loft,
+    Tex.LOBBY: facades.lobby,
+    Tex.DOCK: facades.dock,
+}
 
 
 def _sign(limit: int) -> Layer:
@@ -49,18 +61,11 @@ def _sign(limit: int) -> Layer:
     big = 4 * SIZE
     picture = Image.new("RGB", (big, big), (192, 20, 28))
     draw = ImageDraw.Draw(picture)
-    rim = int(0.135 * big)
+    rim = int(0.105 * big)
     draw.ellipse((rim, rim, big - rim, big - rim), fill=(250, 250, 248))
-    font = ImageFont.load_default(int(0.56 * big))
-    draw.text(
-        (big / 2, big * 0.492),
-        str(limit),
-        (12, 12, 14),
-        font,
-        anchor="mm",
-        stroke_width=big // 44,
-        stroke_fill=(12, 12, 14),
-    )
+    font = ImageFont.load_default(int(0.60 * big))
+    ink = (8, 8, 10)
+    draw.text((big / 2, big / 2), str(limit), ink, font, anchor="mm", stroke_width=big // 36, stroke_fill=ink)
     return flipped(picture.resize((SIZE, SIZE), Image.Resampling.BOX))
 
 
@@ -77,14 +82,18 @@ def texture_layers() -> NDArray[np.uint8]:
     rng = np.random.default_rng(20180614)
     plain = np.full((SIZE, SIZE, 3), 255, np.uint8)
     layers = {
-        Tex.PLAIN: plain, Tex.ASPHALT: asphalt(rng),
-        Tex.SLABS: paving((196, 192, 186), 0.72, 4, 4, rng), Tex.BRICKS: paving((208, 196, 190), 0.74, 12, 6, rng),
-        Tex.GRASS: leaves((112, 138, 74), rng, 8), Tex.GRAVEL: speckled((176, 162, 136), rng, 0.14, 0.10, 8),
-        Tex.LEAVES: leaves((226, 232, 214), rng, 10), Tex.NEEDLES: leaves((214, 222, 214), rng, 20),
+        Tex.PLAIN: plain,
+        Tex.ASPHALT: asphalt(rng),
+        Tex.SLABS: paving((196, 192, 186), 0.72, 4, 4, rng),
+        Tex.BRICKS: paving((208, 196, 190), 0.74, 12, 6, rng),
+        Tex.GRASS: leaves((112, 138, 74), rng, 8),
+        Tex.GRAVEL: speckled((176, 162, 136), rng, 0.14, 0.10, 8),
+        Tex.LEAVES: leaves((226, 232, 214), rng, 10),
+        Tex.NEEDLES: leaves((214, 222, 214), rng, 20),
         Tex.TILES: paving((214, 206, 202), 0.66, 12, 8, rng),
-        Tex.SASH: facades.sash(rng), Tex.PANE: facades.pane(rng), Tex.BALCONY: facades.balcony(rng), Tex.SHOP: facades.shop(rng), Tex.HALL: facades.hall(rng),
-        Tex.GLASS: facades.glass(rng), Tex.BAND: facades.band(rng), Tex.LOFT: facades.loft(rng), Tex.LOBBY: facades.lobby(rng), Tex.DOCK: facades.dock(rng),
-        Tex.SIGN_30: _sign(30), Tex.SIGN_60: _sign(60), Tex.SIGN_90: _sign(90),
-        Tex.POSTER_A: _poster((222, 176, 58), (60, 44, 40), "JAZZ"), Tex.POSTER_B: _poster((58, 110, 128), (238, 236, 220), "EXPO"),
-    }  # fmt: skip
+        **{layer: draw(rng) for layer, draw in _FACADES.items()},
+        **{layer: _sign(limit) for limit, layer in SIGN_LAYERS.items()},
+        Tex.POSTER_A: _poster((222, 176, 58), (60, 44, 40), "JAZZ"),
+        Tex.POSTER_B: _poster((58, 110, 128), (238, 236, 220), "EXPO"),
+    }
     return np.stack([layers[t] for t in Tex])

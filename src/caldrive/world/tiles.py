@@ -1,7 +1,8 @@
-"""What of a town is drawn from where: first its tiles in sight of a place, then of these the triangles that face the camera."""
+"""What of a town is drawn from where: the tiles in sight of a place, and of these the triangles that face the camera."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from caldrive.world.meshes import Mesh
 from caldrive.world.sight import CELL, Cells
 
-DETAIL = 40.0  # m within which details are drawn
+DETAIL = 32.0  # m within which details are drawn
 EVERYWHERE = 100.0  # m: larger triangles belong to no tile
 KEPT = 128  # places whose triangles are remembered
 
@@ -38,12 +39,34 @@ class View:
 
     def sees(self, at: NDArray[np.floating], reach: NDArray[np.floating] | float) -> NDArray[np.bool_]:
         """Which circles around points (N, 2) of the plane reach into the view."""
-        slope = np.sqrt(1 + self.tangent**2)
-        ahead = at @ self.ahead.astype(at.dtype)
-        ahead -= self.eye[:2] @ self.ahead
-        beside = np.abs(at @ self.left.astype(at.dtype) - self.eye[:2] @ self.left)
-        beside -= ahead * self.tangent
-        return np.asarray((beside < reach * slope) & (ahead > -reach))
+        slope = math.sqrt(1 + self.tangent**2)
+        sides = np.stack((self.ahead, self.left)).astype(at.dtype)
+        ahead, beside = sides @ at.T - (sides @ self.eye[:2].astype(at.dtype))[:, None]
+        return np.asarray((np.abs(beside) - ahead * at.dtype.type(self.tangent) < reach * slope) & (ahead > -reach))
+
+
+@dataclass(frozen=True)
+class Place:
+    """A small box of eye positions: within it one decision holds on which tiles are in sight, and in which detail."""
+
+    low: tuple[float, float, float]
+    size: float
+    detail: float
+
+    @classmethod
+    def around(cls, eye: NDArray[np.float64], size: float, detail: float) -> Place:
+        x, y, z = (float(v) for v in np.floor(eye / size) * size)
+        return cls((x, y, z), size, detail)
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        return np.array(self.low)[:2] + self.size / 2
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """The box's corners (8, 3)."""
+        steps = np.stack(np.meshgrid((0, 1), (0, 1), (0, 1)), axis=-1).reshape(-1, 3)
+        return np.array(self.low) + self.size * steps
 
 
 @dataclass(frozen=True)
@@ -54,6 +77,12 @@ class _Faces:
     planes: Floats  # (N, 4)
     middles: Floats  # (N, 2)
     reach: Floats  # (N,)
+
+    def facing(self, eyes: NDArray[np.float64]) -> _Faces:
+        """Those that face at least one of some eyes (N, 3)."""
+        return self.take(
+            np.flatnonzero((self.planes @ np.column_stack((eyes, np.ones(len(eyes)))).T > -1e-3).any(axis=1))
+        )
 
     def take(self, chosen: NDArray[np.int64]) -> _Faces:
         return _Faces(self.triangles[chosen], self.planes[chosen], self.middles[chosen], self.reach[chosen])
@@ -79,22 +108,20 @@ class Tiles:
         triangles = np.concatenate([m.triangles + np.uint32(o) for (m, _), o in zip(parts, offsets, strict=False)])
         faces = _faces(self.vertices, triangles)
         level = np.concatenate([np.full(len(m.triangles), lod) for m, lod in parts])
-        tile = np.column_stack((level, np.floor(faces.middles / CELL).astype(int)))
+        tile = np.column_stack((level, np.floor(np.concatenate([m.places() for m, _ in parts]) / CELL).astype(int)))
         tile[faces.reach > EVERYWHERE] = -1, 0, 0
         self.tiles, which = np.unique(tile, axis=0, return_inverse=True)
         order = np.argsort(which, kind="stable")
         self.bounds = np.searchsorted(which[order], np.arange(len(self.tiles) + 1))
         self.faces = faces.take(order)
-        self._remembered: dict[object, _Faces] = {}
+        self._remembered: dict[Place, _Faces] = {}
 
-    def visible(
-        self, view: View, place: object, seen: Callable[[], Cells | None], center: NDArray[np.float64], detail: float, far: float
-    ) -> NDArray[np.uint32]:
+    def visible(self, view: View, place: Place, seen: Callable[[], Cells | None], far: float) -> NDArray[np.uint32]:
         """Triangles (N, 3) in view that face the eye. seen: the cells in sight of the place, None for all."""
         if place not in self._remembered:
             if len(self._remembered) >= KEPT:
                 self._remembered.pop(next(iter(self._remembered)))
-            self._remembered[place] = self._near(seen(), center, detail, far)
+            self._remembered[place] = self._near(seen(), place.middle, place.detail, far).facing(place.corners)
         faces = self._remembered[place]
         front = faces.planes @ np.array((*view.eye, 1.0), np.float32) > 0
         return faces.triangles[front & view.sees(faces.middles, faces.reach)]

@@ -87,16 +87,16 @@ def sun_direction(altitude: float, azimuth: float) -> Color:
 
 def sunlight(w: Weather) -> Color:
     """Colour of direct sunlight: warm at sunset, dimmed by clouds."""
-    clear = _mix((0.78, 0.74, 0.66), (1.25, 0.72, 0.36), w.sunset)
-    return clear * (1 - w.cloudiness / 100) ** 0.8 * (0.25 if w.cloudiness >= 100 else 1.0)
+    clear = _mix((0.78, 0.74, 0.66), (1.20, 0.78, 0.46), w.sunset)
+    return np.asarray(clear * (1 - w.cloudiness / 100) ** 0.8 * (0.25 if w.cloudiness >= 100 else 1.0))
 
 
 def ambient(w: Weather) -> tuple[Color, Color]:
     """Light from the sky on faces that look up, and from the ground on faces that look down."""
     clouds = w.cloudiness / 100
-    noon = _mix((0.44, 0.50, 0.60), (0.66, 0.67, 0.69), clouds)
-    evening = _mix((0.44, 0.40, 0.46), (0.50, 0.44, 0.44), clouds)
-    sky = _mix(noon, evening, w.sunset) * (1 - 0.20 * w.precipitation / 100)
+    noon = _mix((0.46, 0.51, 0.60), (0.82, 0.83, 0.85), clouds)
+    evening = _mix((0.58, 0.52, 0.57), (0.68, 0.60, 0.58), clouds)
+    sky = _mix(noon, evening, w.sunset) * (1 - 0.10 * w.precipitation / 100)
     return sky, sky * _mix((0.72, 0.68, 0.62), (0.70, 0.68, 0.66), clouds)
 
 
