@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import moderngl
 import numpy as np
 
 from caldrive.world.actors import INSTANCE, Instances
+from caldrive.world.buildings import building_meshes
+from caldrive.world.furniture import furniture_meshes
 from caldrive.world.gl import gl_context, programs
+from caldrive.world.ground import KERB_HEIGHT, far_kerb_mesh, kerb_mesh, road_mesh, yard_mesh
 from caldrive.world.meshes import Mesh, Triangles
-from caldrive.world.tiles import Tiles
+from caldrive.world.roads import RoadNetwork
+from caldrive.world.scenery import Prop
+from caldrive.world.tiles import Level, Tiles
 
 _FORMAT = {"position": "3f", "uv": "3f", "normal": "4f1", "color": "4f1"}
 _SKIPPED = {"position": "3x4", "uv": "3x4", "normal": "4x1", "color": "4x1"}
@@ -40,11 +47,6 @@ class TownBatch:
         self.index.write(triangles)
         self.array.render(vertices=triangles.size)
 
-    def release(self) -> None:
-        self.array.release()
-        self.index.release()
-        self.data.release()
-
 
 class Crowd:
     """Instances of one mesh."""
@@ -61,3 +63,20 @@ class Crowd:
         if n:
             self.buffer.write(np.ascontiguousarray(instances[:n]))
             self.array.render(instances=n)
+
+
+def town_batches(roads: RoadNetwork, scenery: Sequence[Prop]) -> tuple[TownBatch, TownBatch]:
+    """A town's asphalt, and everything else that stands still."""
+    houses = building_meshes(scenery, roads.style)
+    furniture = furniture_meshes(scenery, roads.style, KERB_HEIGHT)
+    asphalt = Tiles([(road_mesh(roads), Level.ALWAYS)])
+    standing = Tiles([
+        (houses.always, Level.ALWAYS), (houses.near, Level.NEAR), (houses.far, Level.FAR),
+        (furniture.always, Level.ALWAYS), (furniture.near, Level.NEAR), (furniture.far, Level.FAR),
+        (kerb_mesh(roads), Level.NEAR), (far_kerb_mesh(roads), Level.ALWAYS), (yard_mesh(roads), Level.ALWAYS),
+    ])  # fmt: skip
+    made = programs()
+    return (
+        TownBatch(asphalt, made.road, ("position", "uv", "color")),
+        TownBatch(standing, made.static, ("position", "uv", "normal", "color")),
+    )

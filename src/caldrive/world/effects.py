@@ -15,7 +15,7 @@ void main() {
     vec2 thrown = -sun_direction.xy / sun_direction.z * stands.w;
     sweep = vec2(c * thrown.x + s * thrown.y, -s * thrown.x + c * thrown.y) + vec2(1e-4);
     half_size = extent.xyz;
-    local = corner * (extent.xy + 0.3) + vec2(corner.x * sweep.x > 0.0 ? sweep.x : 0.0, corner.y * sweep.y > 0.0 ? sweep.y : 0.0);
+    local = corner * (extent.xy + 0.3) + mix(vec2(0.0), sweep, greaterThan(corner * sweep, vec2(0.0)));
     vec2 ground = vec2(c * local.x - s * local.y, s * local.x + c * local.y) + stands.xy;
     gl_Position = view_projection * vec4(ground, extent.w, 1.0);
     place = vec4((ground - shadow_area.xy) * shadow_area.zw, 0.1, 0.0);
@@ -58,7 +58,7 @@ void main() {
         world = vec3(foot + along * corner.y * 0.36 * away - across * corner.x * 0.26, 0.03);
         strength = 0.40 * wet.x;
     } else {
-        float size = 2.4 * clamp(0.9 * away / lens.z, radius, 2.0 * radius);
+        float size = 2.4 * clamp(1.25 * away / lens.z, radius, 2.2 * radius);
         world = lamp.xyz + size * vec3(corner.x * sin(lamp.w), -corner.x * cos(lamp.w), corner.y);
         strength = 1.0;
     }

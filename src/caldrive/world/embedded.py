@@ -15,6 +15,8 @@ from caldrive.datatypes import (
     Control,
     Image,
     Observation,
+    Points,
+    Pose,
     Scenario,
     Sign,
     TrafficLight,
@@ -37,7 +39,8 @@ from caldrive.world.vehicle import EgoState, advance
 from caldrive.world.weather import weather
 
 DT = 0.1  # s, 10 Hz control (section 4)
-NEAR = 12.0  # m within which solid things are tested for contact
+NEAR = 12.0  # m within which cars and people are tested for contact
+SEEN = 40.0  # m within which signs and lights are looked at
 
 
 class EmbeddedWorld:
@@ -63,6 +66,7 @@ class EmbeddedWorld:
         self.ego_state = EgoState(route.line.pose_at(0.0))
         self.progress = 0.0
         self.lights = Lights(self.roads, lights)
+        self._lights_at = _places(self.lights.shown())
         self.vehicles: tuple[VehicleState, ...] = ()
         self.pedestrians = Pedestrians(self.roads, scenario.n_pedestrians, people, scenario.crossing)
         self.traffic: Traffic | None = None
@@ -130,7 +134,8 @@ class EmbeddedWorld:
         self._solid = [
             Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)
         ]
-        self._solid_at = np.array([(o.pose.x, o.pose.y) for o in self._solid]).reshape(-1, 2)
+        self._solid_at = _places(self._solid)
+        self._signs_at = _places(self.roads.signs)
         self._solid_reach = np.array([np.hypot(o.length, o.width) / 2 for o in self._solid])
         if self._camera is not None:
             self._camera.close()
@@ -157,14 +162,11 @@ class EmbeddedWorld:
         return sorted(found)
 
     def _label(self, ego: VehicleState) -> Affordances:
-        here, near = ego.pose, self.progress
-        signs = self._signs_near()
-        lights = [one for one in self.signals if abs(one.pose.x - here.x) + abs(one.pose.y - here.y) < 40]
-        return label(ego, self.vehicle.front_axle, self.route.line, near, self.vehicles, self.people, lights, signs)
-
-    def _signs_near(self) -> list[Sign]:
-        here = self.ego.pose
-        return [s for s in self.roads.signs if abs(s.pose.x - here.x) + abs(s.pose.y - here.y) < 40]
+        signs = [self.roads.signs[i] for i in _near(ego.pose, self._signs_at, SEEN)]
+        lights = [self.signals[i] for i in _near(ego.pose, self._lights_at, SEEN)]
+        return label(
+            ego, self.vehicle.front_axle, self.route.line, self.progress, self.vehicles, self.people, lights, signs
+        )
 
     def _observe(self) -> Observation:
         self.vehicles = self.traffic.cars if self.traffic is not None else ()
@@ -194,3 +196,12 @@ class EmbeddedWorld:
             goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
             speed_limit=[limit for s, limit in self._limits if s <= self.progress + 0.1][-1],
         )
+
+
+def _places(things: Sequence[Obstacle] | Sequence[Sign] | Sequence[TrafficLight]) -> Points:
+    return np.array([(thing.pose.x, thing.pose.y) for thing in things]).reshape(-1, 2)
+
+
+def _near(here: Pose, places: Points, reach: float) -> list[int]:
+    """Which places lie within a square around here."""
+    return np.flatnonzero(np.abs(places - (here.x, here.y)).max(axis=1, initial=0.0) < reach).tolist()

@@ -16,11 +16,13 @@ from caldrive.world.textures import texture_layers
 def gl_context() -> moderngl.Context:
     """The process's one OpenGL context. Raises RuntimeError where the machine has no EGL."""
     try:
-        return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[arg-type]
+        context = moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[arg-type]
     except Exception as error:  # moderngl raises bare Exceptions here
         raise RuntimeError(
             f"found no EGL with OpenGL 3.3 ({error}): type apt-get install libegl1 libgl1-mesa-dri"
         ) from error
+    context.gc_mode = "auto"  # what Python forgets is freed
+    return context
 
 
 class Programs:
@@ -40,8 +42,6 @@ class Programs:
         self.corners = gl.buffer(np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)], "f4").tobytes())
         self.layers = _mipmapped_array(texture_layers())
         self.drops = gl.texture((128, 128), 1, rain_drops().tobytes())
-        self.drops.build_mipmaps()
-        self.drops.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
 
     def _program(self, vertex: str, fragment: str) -> moderngl.Program:
         program = gl_context().program(vertex_shader=vertex, fragment_shader=fragment)
@@ -109,8 +109,3 @@ class Target:
         picture = np.empty(self.shape, np.uint8)
         self.resolved.read_into(picture, components=3, alignment=1)
         return picture
-
-    def release(self) -> None:
-        self.drawn.release()
-        if self.resolved is not self.drawn:
-            self.resolved.release()

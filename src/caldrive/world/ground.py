@@ -1,8 +1,8 @@
 """The ground: lane strips with their markings, junctions, kerbs, sidewalks and the yards behind them.
 
 The lines themselves are drawn by the road shader; a strip carries what it needs: uv = (metres left of the lane's
-middle, dashes travelled along its left line, metres to the stop line), color = (kind of the left line, kind of the right
-line, half width in units of 2 cm).
+middle, dashes travelled along its left line, metres to the stop line), color = (kind of the left line, kind of the
+right line, half width in units of 2 cm).
 """
 
 from __future__ import annotations

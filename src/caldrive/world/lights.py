@@ -55,7 +55,16 @@ class Junction:
     """The lights of one junction. posts: its approaches in the order of their turns."""
 
     def __init__(self, posts: tuple[LightPost, ...], phase: Phase) -> None:
-        self.posts, self.phase = posts, phase
+        self.posts = posts
+        self.change(phase)
+
+    def change(self, phase: Phase) -> None:
+        """Shows a phase; lights stay the same objects as long as it lasts."""
+        self.phase = phase
+        self.lights = tuple(
+            TrafficLight(post.id, post.pose, state, post.stop_line)
+            for post, state in zip(self.posts, self.states(), strict=True)
+        )
 
     def states(self) -> list[LightState]:
         """What each post shows."""
@@ -107,13 +116,11 @@ class Lights:
         first = 0
         for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
             last = first + len(junction.posts)
-            junction.phase = next_phase(junction.phase, time, waiting[first:last].tolist(), busy)
+            phase = next_phase(junction.phase, time, waiting[first:last].tolist(), busy)
+            if phase is not junction.phase:
+                junction.change(phase)
             first = last
 
     def shown(self) -> tuple[TrafficLight, ...]:
         """Every light with what it shows."""
-        return tuple(
-            TrafficLight(post.id, post.pose, state, post.stop_line)
-            for junction in self.junctions.values()
-            for post, state in zip(junction.posts, junction.states(), strict=True)
-        )
+        return tuple(light for junction in self.junctions.values() for light in junction.lights)

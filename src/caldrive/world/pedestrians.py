@@ -118,6 +118,7 @@ class Pedestrians:
                 f"found {n} people asked for, but {roads.name} has room for {room}: ask for fewer with --people"
             )
         self.n = n
+        self.names = [f"person{k}" for k in range(n)]
         self.loop = rng.choice(len(lengths), size=n, p=lengths / lengths.sum())
         self.s = rng.uniform(0, lengths[self.loop]) if n else np.zeros(0)
         self.way = rng.choice([-1.0, 1.0], size=n)
@@ -190,13 +191,11 @@ class Pedestrians:
 
     def states(self) -> tuple[PedestrianState, ...]:
         """Everybody as of now."""
+        speed = np.where(self.walking, self.pace, 0.0)
+        rows = np.column_stack((self.position, self.heading, speed, self.on_road)).tolist()
         return tuple(
-            PedestrianState(
-                Pose(float(x), float(y), float(h)), float(p) if w else 0.0, on_road=bool(r), id=f"person{k}"
-            )
-            for k, ((x, y), h, p, w, r) in enumerate(
-                zip(self.position, self.heading, self.pace, self.walking, self.on_road, strict=True)
-            )
+            PedestrianState(Pose(x, y, heading), pace, on_road=road > 0, id=name)
+            for (x, y, heading, pace, road), name in zip(rows, self.names, strict=True)
         )
 
 

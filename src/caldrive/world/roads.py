@@ -51,7 +51,7 @@ class LightPost:
     pose: Pose
     stop_line: tuple[tuple[float, float], tuple[float, float]]
 
-    @property
+    @cached_property
     def id(self) -> str:
         return f"{self.light}/{self.lane}"
 

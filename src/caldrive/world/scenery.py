@@ -47,7 +47,7 @@ class Prop:
 
 @dataclass(frozen=True)
 class Style:
-    """What lines the streets. frontage, depth, tree_gap, tree_height: (least, most) metres. gap: share of empty plots."""
+    """What lines the streets. frontage, depth, tree_gap, tree_height: least and most metres. gap: share of plots."""
 
     buildings: int
     frontage: tuple[float, float]
@@ -158,7 +158,7 @@ def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> It
     chosen = chosen[_without_overlaps(_boxes(center[chosen], outward[chosen], depth[chosen], width[chosen]))]
     for i in chosen:
         pose = _facing_road(center[i], outward[i])
-        yield Prop("building", pose, depth[i], width[i], floors[i] * style.floor, int(variant[i]))
+        yield Prop("building", pose, float(depth[i]), float(width[i]), float(floors[i] * style.floor), int(variant[i]))
     houses = _boxes(center[chosen], outward[chosen], depth[chosen] + 0.5, width[chosen] + 0.5)
     empty = np.setdiff1d(np.arange(n), chosen)
     yield from _in_gaps(middles[empty], outward[empty], shapely.union_all(houses), keep_off, style, rng)

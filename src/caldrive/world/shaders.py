@@ -76,14 +76,14 @@ void main() {
 """
 )
 
-# A line covers as much of a pixel as the pixel's width on the road overlaps it: no flicker, and far lines fade as they should.
+# A line covers as much of a pixel as the pixel's width on the road overlaps it: far lines fade and do not flicker.
 ROAD_FRAGMENT = (
     BLOCKS
     + LIGHT
     + """
 uniform sampler2DArray layers;
 uniform vec3 center_color; uniform vec3 edge_color; uniform vec3 asphalt;
-uniform vec4 widths;     // half widths of centre and edge line, distance of the edge line from the edge, share of a dash
+uniform vec4 widths;     // half widths of centre and edge line, inset of the edge line, share of a dash
 in vec2 ground; in vec3 lane; flat in vec3 kinds; in vec4 place;
 out vec4 pixel;
 float stripe(float at, float footprint, float middle, float half_width) {
@@ -149,10 +149,11 @@ void main() {
     vec3 world = vec3(c * p.x - s * p.y + placed.x, s * p.x + c * p.y + placed.y, p.z + 0.12 * fourth.w);
     n = vec3(c * n.x - s * n.y, s * n.x + c * n.y, n.z);
     gl_Position = view_projection * vec4(world, 1.0);
-    vec3 albedo = slot == 1 ? first.rgb : slot == 2 ? second.rgb : slot == 3 ? third.rgb : slot == 4 ? fourth.rgb : vec3(1.0);
-    albedo *= color.rgb;
+    vec3 own = slot == 1 ? first.rgb : slot == 2 ? second.rgb : slot == 3 ? third.rgb : fourth.rgb;
+    vec3 albedo = slot > 0 && slot < 5 ? own * color.rgb : color.rgb;
     float gloss = slot == 5 ? 0.30 : slot == 1 && limb == 0 && fourth.rgb == vec3(0.0) ? 0.12 : 0.0;
-    lit = albedo * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * n.z) + gloss * horizon.rgb * (0.35 + 0.65 * max(n.z, 0.0));
+    lit = albedo * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * n.z);
+    lit += gloss * horizon.rgb * (0.35 + 0.65 * max(n.z, 0.0));
     sunlit = albedo * sun.rgb * max(dot(n, sun_direction.xyz), 0.0);
     if (limb == 8) { lit = albedo; sunlit = vec3(0.0); }
     place = vec4((placed.xy - shadow_area.xy) * shadow_area.zw, p.z, 0.0);

@@ -37,7 +37,7 @@ def _drawn(props: Sequence[Prop], bounds: tuple[float, float, float, float], kin
             draw.ellipse((x - r, y - r, x + r, y + r), fill=_units(0.8 * p.height))
         else:
             corners = (box_corners(p.pose, p.length, p.width) - (x0, y0)) / RESOLUTION
-            draw.polygon([(u, v) for u, v in corners.tolist()], fill=_units(p.height + 1.2))
+            draw.polygon([(u, v) for u, v in corners.tolist()], fill=_units(p.height))
     return np.asarray(picture)
 
 
@@ -73,7 +73,9 @@ def town_bounds(roads_bounds: tuple[float, float, float, float]) -> tuple[float,
 
 def _softened(heights: Heights) -> Heights:
     """Rounds off the steps that pixels leave along slanting edges."""
-    return np.asarray(Image.fromarray(heights).filter(ImageFilter.BoxBlur(2)))
+    soft = np.array(Image.fromarray(heights).filter(ImageFilter.BoxBlur(2)))
+    soft[[0, -1]] = soft[:, [0, -1]] = 0  # the edge stands for everything beyond
+    return soft
 
 
 def shadow_heights(

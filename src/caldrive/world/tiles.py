@@ -1,4 +1,4 @@
-"""What of a town is drawn from where: the tiles in sight of a place, and of these the triangles that face the camera."""
+"""What of a town is drawn from where: the tiles in sight of a place, and of these the triangles that face the eye."""
 
 from __future__ import annotations
 

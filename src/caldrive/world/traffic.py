@@ -13,7 +13,7 @@ import numpy as np
 
 from caldrive.datatypes import LightState, PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved, wrap_angle
-from caldrive.world.lights import Lights
+from caldrive.world.lights import Lights, Phase
 from caldrive.world.roads import Lane, RoadNetwork
 
 EGO = "ego"
@@ -54,6 +54,7 @@ class Traffic:
         for name, (lane, s) in zip(self.size, self._places(n, ego), strict=True):
             self._add(name, lane, s)
         self._shown: dict[str, str] = {}
+        self._phases: dict[str, Phase] = {}
         self._held: set[str] = set()
         self._open_unposted_lights()
         self._show_lights()
@@ -100,6 +101,9 @@ class Traffic:
     def _show_lights(self) -> None:
         """Tells SUMO what the lights show; links without a post stay green."""
         for name, junction in self.lights.junctions.items():
+            if self._phases.get(name) is junction.phase:
+                continue
+            self._phases[name] = junction.phase
             if name not in self._shown:
                 self._shown[name] = "G" * len(libsumo.trafficlight.getControlledLinks(name))
             row = list(self._shown[name])
@@ -107,9 +111,8 @@ class Traffic:
                 for link in post.links:
                     row[link] = _LETTER[state]
             text = "".join(row)
-            if self._shown[name] != text:
-                libsumo.trafficlight.setRedYellowGreenState(name, text)
-                self._shown[name] = text
+            libsumo.trafficlight.setRedYellowGreenState(name, text)
+            self._shown[name] = text
 
     def _open_unposted_lights(self) -> None:
         """A map may name lights where no post stands: nobody would know to wait there."""
