@@ -45,7 +45,7 @@ def oracle(camera: CameraConfig | None, config: ControlConfig) -> tuple[Embedded
 
 
 def network_agent(
-    model: Path | None, config: ControlConfig, threads: int | None = None
+    model: Path | None, config: ControlConfig, threads: int | None = 1
 ) -> tuple[CALAgent, CameraConfig]:
     """The agent that drives by a network, and the camera that it needs."""
     from caldrive.perception.predictor import NetworkPerception
