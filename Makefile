@@ -6,7 +6,7 @@ ARGS ?=
 
 .PHONY: drive test lint clean
 drive: $(READY)
-	$(BIN)/caldrive drive --cars 20 --people 50 --task one-turn --out out/drive $(ARGS)
+	$(BIN)/caldrive drive --task straight --cars 20 --people 50 --out out/drive $(ARGS)
 
 test: $(READY) lint
 	$(BIN)/pytest -n 2 $(ARGS)
