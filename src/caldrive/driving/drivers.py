@@ -44,9 +44,7 @@ def oracle(camera: CameraConfig | None, config: ControlConfig) -> tuple[Embedded
     return world, CALAgent(OraclePerception(world.truth), Controller(config, world.dt))
 
 
-def network_agent(
-    model: Path | None, config: ControlConfig, threads: int | None = 1
-) -> tuple[CALAgent, CameraConfig]:
+def network_agent(model: Path | None, config: ControlConfig, threads: int | None = 1) -> tuple[CALAgent, CameraConfig]:
     """The agent that drives by a network, and the camera that it needs."""
     from caldrive.perception.predictor import NetworkPerception
 
