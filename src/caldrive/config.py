@@ -78,7 +78,7 @@ class LongitudinalConfig:
     red_threshold: float = 0.9
     red_gain: float = 1.5
     red_floor: float = 0.8
-    hazard_threshold: float = 0.7
+    hazard_threshold: float = 0.95
     hold_speed: float = 1.0
     hold_brake: float = 0.3
 

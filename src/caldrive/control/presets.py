@@ -39,6 +39,7 @@ PAPER = ControlConfig(
         over_limit_gain=0.0,
         red_gain=0.2,
         red_floor=0.0,
+        hazard_threshold=0.7,
         hold_speed=0.0,
         hold_brake=0.0,
     )
