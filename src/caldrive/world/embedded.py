@@ -56,7 +56,7 @@ class EmbeddedWorld:
     def reset(self, scenario: Scenario) -> Observation:
         """Starts an episode. Raises ValueError or FileNotFoundError for a scenario that cannot be."""
         weather(scenario.weather)
-        self._enter(scenario.town)
+        self.enter(scenario.town)
         return self.start(scenario, plan_route(self.roads, scenario.start, scenario.goal))
 
     def start(self, scenario: Scenario, route: Route) -> Observation:
@@ -106,8 +106,9 @@ class EmbeddedWorld:
         return VehicleState(self.ego_state.pose, self.ego_state.speed, self.vehicle.length, self.vehicle.width, "ego")
 
     def enter(self, town: str) -> RoadNetwork:
-        """Loads a town without starting an episode."""
-        self._enter(town)
+        """Loads a town, if it is not the one already there, without starting an episode."""
+        if town != self._town:
+            self._load(town)
         return self.roads
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
@@ -124,9 +125,7 @@ class EmbeddedWorld:
         ego = self.ego
         return self._label(replace(ego, pose=moved(ego.pose, left=left, turn=yaw)))
 
-    def _enter(self, town: str) -> None:
-        if town == self._town:
-            return
+    def _load(self, town: str) -> None:
         self.roads = load_town(town)
         self.scenery = build_scenery(self.roads)
         self.surface = Surface(self.roads)
