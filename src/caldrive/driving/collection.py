@@ -17,10 +17,11 @@ import numpy as np
 
 from caldrive.config import CameraConfig, ControlConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Scenario
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Pose, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.episodes import EpisodeWriter, Frame
 from caldrive.world.embedded import EmbeddedWorld
+from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.route import random_route
 
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
@@ -30,7 +31,9 @@ CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines
 
 @dataclass(frozen=True)
 class CollectConfig:
-    """What to record. duration: s of an episode. crossing: how much more people cross than usual."""
+    """What to record. duration: s of an episode. crossing: how much more people cross than usual.
+    before_signs: share of the episodes that begin before a sign, hidden_cars: of those whose driver sees no car ahead.
+    """
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 3, 6, 8)
@@ -39,6 +42,7 @@ class CollectConfig:
     cars: int = 20
     people: int = 70
     crossing: float = 3.0
+    before_signs: float = 0.5
     hidden_cars: float = 0.1
     width: int = 200
     height: int = 88
@@ -105,14 +109,34 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
     return frames
 
 
+def starting_place(roads: RoadNetwork, before_signs: float, rng: np.random.Generator) -> Pose:
+    """Anywhere on the roads, or in a share of the cases some way before a sign; each limit gets as many of these."""
+    lanes = [lane for lane in roads.driveable if lane.line.length > 12]
+    lane = lanes[int(rng.integers(len(lanes)))]
+    s = float(rng.uniform(3, lane.line.length - 3))
+    limits = sorted({sign.limit for sign in roads.signs})
+    if limits and rng.random() < before_signs:
+        limit = limits[int(rng.integers(len(limits)))]
+        signs = [sign for sign in roads.signs if sign.limit == limit]
+        lane, at = roads.lane_at(signs[int(rng.integers(len(signs)))].pose)
+        return _upstream(roads, lane, at - float(rng.uniform(15, 60)))
+    return lane.line.pose_at(s)
+
+
+def _upstream(roads: RoadNetwork, lane: Lane, s: float) -> Pose:
+    """The place s m along a lane; where that is negative, as far up the street before it, but inside no junction."""
+    before = [one for one in roads.lanes.values() if lane.id in one.successors]
+    if s >= 1 or len(before) != 1 or before[0].turn is not None:
+        return lane.line.pose_at(max(s, 1.0))
+    return _upstream(roads, before[0], s + before[0].line.length)
+
+
 def _set_up(
     world: EmbeddedWorld, config: CollectConfig, number: int, rng: np.random.Generator
 ) -> tuple[Scenario, CALAgent]:
     """A random start and random turns; returns the scenario and the driver."""
     roads = world.enter(config.town)
-    lanes = [lane for lane in roads.driveable if lane.line.length > 12]
-    lane = lanes[int(rng.integers(len(lanes)))]
-    start = lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3)))
+    start = starting_place(roads, config.before_signs, rng)
     route = random_route(roads, start, config.duration * 14 + 50, rng)
     weather = config.weathers[number % len(config.weathers)]
     seed = int(rng.integers(2**31))

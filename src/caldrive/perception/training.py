@@ -3,6 +3,7 @@ same weights."""
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import time
@@ -107,13 +108,28 @@ def _start(config: TrainingConfig, perception: PerceptionConfig, frames: Frames,
     return Run(config, network, Adam(network.parameters(), config.learning_rate), sampler, weights)
 
 
+def calibrated(run: Run) -> Network:
+    """A copy of the network whose probabilities are those of the recording.
+
+    Weighted and balanced, training sees rare classes as often as the others, and so the network expects them. Moving
+    each class's last bias by the logarithm of (its share of the frames / its share of the loss) takes that back.
+    """
+    network = copy.deepcopy(run.network)
+    drawn = run.sampler.class_counts()
+    for name, weight in run.weights.items():
+        count = torch.bincount(run.sampler.frames.targets[name], minlength=len(weight)).double()
+        weighted = weight.cpu().double() * torch.from_numpy(drawn[name])
+        shift = (count / weighted).nan_to_num(1.0, posinf=1.0).clamp(min=1e-9).log()
+        network.blocks[name].groups[0].output.bias.data += (shift - shift[0]).to(run.config.device)
+    return network
+
+
 def _validate(run: Run, held: Frames, model: Path) -> Row:
     """Write the network as it is, with its validation metrics, and return them as `validation/<name>`."""
-    found = evaluate(run.network, held, run.config.precision, run.config.device)
+    network = calibrated(run)
+    found = evaluate(network, held, run.config.precision, run.config.device)
     data = summary(run.sampler.frames, held)
-    save_network(
-        model, run.network, CheckpointInfo(run.network.config, data, found, asdict(run.config), run.config.seed)
-    )
+    save_network(model, network, CheckpointInfo(network.config, data, found, asdict(run.config), run.config.seed))
     return {f"validation/{name}": value for name, value in found.items()}
 
 
