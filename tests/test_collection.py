@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 
 from caldrive.datatypes import Control
 from caldrive.driving import collection
-from caldrive.driving.collection import BASELINES, CollectConfig, Disturbance, collect, episode_path
+from caldrive.driving.collection import BASELINES, CollectConfig, Disturbance, collect, episode_path, starting_place
 from caldrive.episodes import Episode, read_episode
 from caldrive.world.embedded import EmbeddedWorld
+from caldrive.world.route import random_route
+from caldrive.world.towns import load_town
 from caldrive.world.traffic import stop_sumo
 
 TINY = CollectConfig("town02", (1, 6), episodes=3, duration=2.0, cars=3, people=10, width=48, height=24, seed=4)
@@ -169,3 +171,21 @@ def test_the_push_at_the_wheel_goes_to_both_sides_and_weakens_with_speed() -> No
 
 def test_a_hard_braking_car_is_left_to_brake() -> None:
     assert {(one.throttle, one.brake) for one in pushes(8.0, control=Control(brake=0.8))} == {(0.0, 0.8)}
+
+
+def test_starts_before_signs_lie_up_the_street_and_show_every_limit() -> None:
+    roads, rng = load_town("town01"), np.random.default_rng(0)
+    passed = set()
+    for _ in range(60):
+        start = starting_place(roads, 1.0, rng)
+        route = random_route(roads, start, 80.0, rng)
+        near = [route.line.project(sign.pose.x, sign.pose.y) for sign in roads.signs]
+        ahead = [(hit.s, sign.limit) for hit, sign in zip(near, roads.signs, strict=True) if -6 < hit.left < 0]
+        passed |= {limit for s, limit in ahead if 2 < s < 80}
+    assert passed == {30, 60, 90}
+
+
+def test_starts_are_anywhere_where_no_share_is_asked_for() -> None:
+    roads, rng = load_town("town02"), np.random.default_rng(0)
+    lanes = {roads.lane_at(starting_place(roads, 0.0, rng))[0].id for _ in range(200)}
+    assert len(lanes) > 0.7 * sum(lane.line.length > 12 for lane in roads.driveable)

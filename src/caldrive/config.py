@@ -111,13 +111,17 @@ class ControlConfig:
 @dataclass(frozen=True)
 class BlockConfig:
     """A task block: kind of layer (dense, lstm, gru or tconv), its nodes (for each command where the affordance is
-    conditional), dropout ratio, length of its sequence in frames and dilation (2: every other frame)."""
+    conditional), dropout ratio, length of its sequence in frames, dilation (2: every other frame), batch norm.
+
+    A conditional block's batch norm sees only the few samples of a batch that have its command: it needs large batches.
+    """
 
     layer: str = "dense"
     nodes: int = 64
     dropout: float = 0.25
     length: int = 1
     dilation: int = 1
+    norm: bool = True
 
     @property
     def span(self) -> int:
@@ -138,8 +142,8 @@ class PerceptionConfig:
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
     vehicle_distance: BlockConfig = BlockConfig("tconv", 64, 0.1, length=3)
-    relative_angle: BlockConfig = BlockConfig("dense", 64, 0.1)
-    center_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
+    relative_angle: BlockConfig = BlockConfig("dense", 64, 0.0, norm=False)
+    center_distance: BlockConfig = BlockConfig("dense", 64, 0.0, norm=False)
 
 
 PERCEPTIONS = {
@@ -169,9 +173,9 @@ class TrainingConfig:
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu or cuda.
     """
 
-    steps: int = 1600
-    batch: int = 12
-    window: int = 6
+    steps: int = 5000
+    batch: int = 32
+    window: int = 1
     learning_rate: float = 1e-3
     warm_up: int = 100
     final_rate: float = 0.02
@@ -190,5 +194,5 @@ class TrainingConfig:
 TRAININGS = {
     "small": TrainingConfig(),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
-    "paper": TrainingConfig(steps=75_000, window=1, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0),
+    "paper": TrainingConfig(steps=75_000, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0),
 }

@@ -44,7 +44,7 @@ class _Group(nn.Module):
             self.layer = {"gru": nn.GRU, "lstm": nn.LSTM}[config.layer](n_features, config.nodes, batch_first=True)
         else:
             raise ValueError(f"a task block's layer is {config.layer!r}, but must be dense, lstm, gru or tconv")
-        self.norm = _SafeBatchNorm(config.nodes)
+        self.norm = _SafeBatchNorm(config.nodes) if config.norm else nn.Identity()
         self.dropout = nn.Dropout(config.dropout)
         self.output = nn.Linear(config.nodes * self.steps, n_outputs)
 

@@ -120,7 +120,8 @@ def calibrated(run: Run) -> Network:
         count = torch.bincount(run.sampler.frames.targets[name], minlength=len(weight)).double()
         weighted = weight.cpu().double() * torch.from_numpy(drawn[name])
         shift = (count / weighted).nan_to_num(1.0, posinf=1.0).clamp(min=1e-9).log()
-        network.blocks[name].groups[0].output.bias.data += (shift - shift[0]).to(run.config.device)
+        bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
+        bias.data += (shift - shift[0]).to(run.config.device)
     return network
 
 
