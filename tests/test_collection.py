@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -47,7 +48,7 @@ def episode(unbroken: Path) -> Episode:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
 
 
 def test_every_moment_is_seen_by_three_cameras_at_their_baselines(episode: Episode) -> None:
@@ -130,6 +131,13 @@ def test_a_recording_killed_within_an_episode_leaves_no_half_file(
 def test_a_finished_recording_has_nothing_left_to_do(unbroken: Path) -> None:
     before = contents(unbroken)
     assert list(collect(TINY, unbroken)) == []
+    assert contents(unbroken) == before
+
+
+def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Path) -> None:
+    before = contents(unbroken)
+    with pytest.raises(ValueError, match="a recording with seed 4, wanted 5"):
+        next(collect(replace(TINY, seed=5, episodes=4), unbroken))
     assert contents(unbroken) == before
 
 

@@ -199,5 +199,10 @@ def test_what_is_collected_can_be_trained_on_and_the_result_drives(
     )
     assert sum(found["counts"]["hazard_stop"].values()) == 2 * 10 * 3  # episodes, moments, cameras
     model = run_json("train", "--data", str(recording), "--out", str(training))["model"]
+    seen = run_json("evaluate", "--data", str(recording), "--model", model, "--held-out")
+    assert 0 < seen["frames"] <= 10 * 3  # one of the two episodes
+    assert 0 <= seen["overall"]["red_light/iou"] <= 1
+    checked = run_json("data", str(recording), "--picture", str(tmp_path / "labels.png"))
+    assert (checked["episodes"], checked["damaged"]) == (2, [])
     driven = run_json(*DRIVE, "--model", model, "--seconds", "1", "--no-video", "--out", str(tmp_path / "drive"))
     assert driven["episodes"][0]["duration"] == pytest.approx(1.0)

@@ -62,6 +62,7 @@ def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, 
     model = train(replace(SHORT, evaluate_every=3), folder, tmp_path, TINY, progress=False)
     rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").open()]
     assert [row["step"] for row in rows if "validation/loss" in row] == [3, 6]
+    assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
     info = load_network(model)[1]
     assert info.metrics["loss"] == rows[-1]["validation/loss"]
     assert info.data["validation_frames"] == 80

@@ -21,8 +21,10 @@ from tyro.conf import subcommand
 from caldrive.driving.settings import (
     AgentSpeedSettings,
     CollectSettings,
+    DataSettings,
     DeterminismSettings,
     DriveSettings,
+    EvaluateSettings,
     Progress,
     TrainSettings,
     WorldSpeedSettings,
@@ -118,13 +120,13 @@ class Collect(CollectSettings, Output):
         from caldrive.driving.collection import CollectConfig, collect
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.driving.tables import counts_table
-        from caldrive.perception.dataset import class_counts
+        from caldrive.perception.dataset import class_counts, find_episodes
 
         require_writable_folder(self.out)
         config = CollectConfig(self.town, self.weathers, self.episodes, self.duration, seed=self.seed)
         for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
             progress(f"recording, {done} done", done / self.episodes)
-        counts = class_counts(self.out)
+        counts = class_counts(find_episodes(self.out))
         return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
 
 
@@ -144,6 +146,45 @@ class Train(TrainSettings, Output):
         return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
 
 
+@dataclass(frozen=True)
+class Data(DataSettings, Output):
+    folder: tyro.conf.Positional[Path] = Path("out/recording")
+    """Folder with the recorded episodes."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.outputs import require_writable_file
+        from caldrive.driving.tables_seen import recording_table
+        from caldrive.perception.recordings import check_recording, draw_histograms
+
+        require_writable_file(self.picture)
+        found, episodes = check_recording(self.folder, lambda share: progress("checking", share))
+        if episodes:
+            draw_histograms(episodes, found.counts, self.picture)
+        values = asdict(found) | {"picture": str(self.picture) if episodes else None}
+        return Answer(values, recording_table(self.folder, found, self.picture), int(bool(found.damaged)))
+
+
+@dataclass(frozen=True)
+class Evaluate(EvaluateSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.drivers import model_path
+        from caldrive.driving.outputs import require_writable_file
+        from caldrive.driving.tables_seen import evaluation_table
+        from caldrive.perception.checkpoint import load_network
+        from caldrive.perception.dataset import Frames, find_episodes, held_out
+        from caldrive.perception.report import PAPER, report
+
+        if self.worst is not None:
+            require_writable_file(self.worst)
+        network, info = load_network(model_path(self.model))
+        episodes = find_episodes(self.data)
+        if self.held_out:
+            episodes = held_out(episodes, info.training)
+        frames = Frames(episodes, (network.config.image_height, network.config.image_width))
+        found = report(network, frames, self.worst, lambda share: progress("evaluating", share))
+        return Answer(asdict(found) | {"paper": PAPER}, evaluation_table(found))
+
+
 Speed = (
     Annotated[WorldSpeed, subcommand("world", description="Camera steps a second, and where the time goes.")]
     | Annotated[AgentSpeed, subcommand("agent", description="Milliseconds from image to control.")]
@@ -152,6 +193,8 @@ Command = (
     Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
     | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
     | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
+    | Annotated[Data, subcommand("data", description="Check and describe a recording.")]
+    | Annotated[Evaluate, subcommand("evaluate", description="How well a network sees recorded frames.")]
     | Annotated[Town, subcommand("town", description="Draw a town on one page.")]
     | Annotated[Speed, subcommand("speed", description="Measure how fast the world or the agent is.")]
     | Annotated[

@@ -6,10 +6,11 @@ same files as an unbroken one.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -19,12 +20,13 @@ from caldrive.config import CameraConfig, ControlConfig
 from caldrive.control.controller import Controller
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Pose, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
-from caldrive.episodes import EpisodeWriter, Frame
+from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame, write_whole
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.route import random_route
 
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
+MANIFEST = "manifest.json"
 MAX_YAW = math.radians(15)
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
 
@@ -173,9 +175,27 @@ def _record(config: CollectConfig, number: int, folder: Path) -> int:
     return record_episode(_world, config, number, folder)
 
 
+def _claim(folder: Path, config: CollectConfig) -> None:
+    """Writes down what is recorded in a folder. Raises ValueError where that is something else already."""
+    manifest = folder / MANIFEST
+    wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION}))
+    del wanted["episodes"]  # a recording may grow
+    found = json.loads(manifest.read_text()) if manifest.is_file() else wanted
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise ValueError(
+                f"found in {folder} a recording with {name} {found.get(name)}, wanted {value}: give another --out, or "
+                f"the settings in {manifest}"
+            )
+    write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
+
+
 def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[tuple[int, int]]:
-    """Records what is missing in a folder; yields (episode, frames) as they are done."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Records what is missing in a folder; yields (episode, frames) as they are done.
+
+    Raises ValueError where the folder holds a recording with other settings.
+    """
+    _claim(folder, config)
     missing = [k for k in range(config.episodes) if not episode_path(folder, k).exists()]
     if workers == 1:
         yield from ((k, _record(config, k, folder)) for k in missing)

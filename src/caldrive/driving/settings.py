@@ -129,3 +129,25 @@ class TrainSettings:
     """small, for two cores, or paper."""
     seed: int = 0
     """Decides everything random."""
+
+
+@dataclass(frozen=True)
+class DataSettings:
+    """Check every file and image of a recording, count its labels and draw their histograms."""
+
+    picture: Path = Path("out/recording.png")
+    """The PNG file for the histograms."""
+
+
+@dataclass(frozen=True)
+class EvaluateSettings:
+    """How well a network sees recorded frames: by command, weather and town, beside the paper's figures."""
+
+    data: Path = Path("out/recording")
+    """Folder with the recorded episodes."""
+    model: Path | None = None
+    """The network, a .safetensors file; without it the one in the package."""
+    held_out: bool = False
+    """Only those episodes that training on this folder kept for validation."""
+    worst: Path | None = None
+    """A PNG file for the frames that it gets most wrong."""

@@ -6,7 +6,7 @@ batch lists each frame once and says where the windows find it, so no frame pass
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,15 +45,17 @@ def find_episodes(folder: Path | str) -> list[Episode]:
     return [read_episode(path) for path in paths]
 
 
-def class_counts(folder: Path | str) -> dict[str, dict[str, int]]:
+def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
     """How many frames of a recording have each value of the discrete affordances and of the command."""
-    columns = [episode.columns for episode in find_episodes(folder)]
-    names = [*(s.name for s in SPECS if s.discrete), "command"]
     found = {}
-    for name in names:
-        values, counts = np.unique(np.concatenate([c[name] for c in columns]), return_counts=True)
-        found[name] = {str(v): int(n) for v, n in zip(values, counts, strict=True)}
+    for name in (*(s.name for s in SPECS if s.discrete), "command"):
+        values, counts = np.unique(np.concatenate([e.columns[name] for e in episodes]), return_counts=True)
+        found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
     return found
+
+
+def _short(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
@@ -65,6 +67,16 @@ def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Ep
     n_held = min(max(1, round(share * len(episodes))), len(episodes) - 1)
     held = set(order[:n_held].tolist())
     return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
+
+
+def held_out(episodes: Sequence[Episode], training: Mapping[str, Any]) -> list[Episode]:
+    """The episodes that a training with these settings keeps for validation. Raises EpisodeError where the settings
+    are not known."""
+    try:
+        share, seed = float(training["validation_share"]), int(training["seed"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise EpisodeError("the network does not say how it was trained: leave --held-out away") from error
+    return split(episodes, share, seed)[1]
 
 
 class Frames:
@@ -81,6 +93,9 @@ class Frames:
         self.command = np.array([COMMAND_NUMBERS[word] for word in words], dtype=np.int64)
         self.targets = encode_columns(self.labels)
         self.stream_start = self._stream_starts(episodes)
+        lengths = [len(e) for e in episodes]
+        self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
+        self.town = np.repeat([e.scenario.town for e in episodes], lengths)
         self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
         self._pool = ThreadPoolExecutor(2)
         self._cache: NDArray[np.uint8] | None = None
@@ -106,6 +121,10 @@ class Frames:
             found, wanted = (f"{w} x {h}" for h, w in (image.shape[:2], self.size))
             raise EpisodeError(f"{episode.path} has images of {found}, the network takes {wanted}: record at that size")
         return image
+
+    def source(self, i: int) -> tuple[Episode, int]:
+        """The episode and the row that frame i comes from."""
+        return self._where[i]
 
     def images(self, ids: Ids) -> NDArray[np.uint8]:
         """Images (N, H, W, 3) of frames by number."""

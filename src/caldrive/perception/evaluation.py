@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from caldrive.perception.dataset import Batch, Frames, every_window
+from caldrive.perception.dataset import Batch, Frames, Ids, every_window
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
-from caldrive.perception.specs import losses, metrics
+from caldrive.perception.specs import Outputs, Targets, losses, metrics
 
 WINDOW = 16  # frames that are evaluated together
+Done = Callable[[float], None]  # told the share that is done
+
+
+def unwatched(share: float) -> None:
+    """Progress that nobody follows."""
 
 
 def use_bf16(precision: str, device: str) -> bool:
@@ -39,19 +46,28 @@ def outputs_of(network: Network, batch: Batch, images: Tensor, device: str) -> d
 
 
 @torch.no_grad()
-def evaluate(network: Network, frames: Frames, precision: str = "auto", device: str = "cpu") -> dict[str, float]:
-    """Metrics over all frames, and each affordance's unweighted loss as `<name>/loss`, their sum as `loss`."""
+def outputs_on(
+    network: Network, frames: Frames, precision: str = "auto", device: str = "cpu", progress: Done = unwatched
+) -> tuple[Ids, Outputs, Targets]:
+    """Numbers (N,) of all frames (but a stream's last few), outputs (N, K) and targets (N,) on them."""
     network.eval()
     window = min(WINDOW, len(frames))
     while not len(frames.starts(window)):
         window //= 2
-    outputs, targets = [], []
+    ids, outputs, targets = [], [], []
     for starts in every_window(frames, window, batch=8):
         batch = frames.batch(starts, window, network.span - 1)
         with autocast(precision, device):
             outputs.append(outputs_of(network, batch, normalise(to_float(batch.images)), device))
+        ids.append((starts[:, None] + np.arange(window)).ravel())
         targets.append(batch.targets)
+        progress(float(ids[-1][-1]) / len(frames))
     joined = {name: torch.cat([o[name].float().cpu() for o in outputs]) for name in outputs[0]}
-    wanted = {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
-    parts = {f"{name}/loss": float(value) for name, value in losses(joined, wanted).items()}
-    return {"loss": sum(parts.values())} | parts | metrics(joined, wanted)
+    return np.concatenate(ids), joined, {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
+
+
+def evaluate(network: Network, frames: Frames, precision: str = "auto", device: str = "cpu") -> dict[str, float]:
+    """Metrics over all frames, and each affordance's unweighted loss as `<name>/loss`, their sum as `loss`."""
+    _, outputs, targets = outputs_on(network, frames, precision, device)
+    parts = {f"{name}/loss": float(value) for name, value in losses(outputs, targets).items()}
+    return {"loss": sum(parts.values())} | parts | metrics(outputs, targets)

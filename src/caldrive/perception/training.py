@@ -19,6 +19,7 @@ from torch.optim import Adam
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.episodes import write_whole
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, read_tensors, save_network, write_tensors
+from caldrive.perception.curves import draw_curves
 from caldrive.perception.dataset import Frames, Sampler, find_episodes, split, summary
 from caldrive.perception.evaluation import autocast, evaluate, outputs_of
 from caldrive.perception.images import augment, normalise, to_float
@@ -152,7 +153,7 @@ def train(
     """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
 
     In `out` lie also state.safetensors, from which the same call resumes, and metrics.jsonl: a row a step with its
-    loss, and validation metrics every `evaluate_every` steps and at the end. `stop` may end the run early after a step.
+    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them. `stop` may end the run early after a step.
     """
     out, perception = Path(out), perception or PerceptionConfig()
     size = (perception.image_height, perception.image_width)
@@ -178,4 +179,6 @@ def train(
                 write_whole(log, "".join(json.dumps(r) + "\n" for r in rows).encode())
                 run.save(state)
             bar.update(task, completed=run.step, note=f"loss {row['loss']:.3f}")
+    if rows:
+        draw_curves(rows, out / "curves.png")
     return model

@@ -1,0 +1,34 @@
+"""The curves of a training run as a picture: its loss, and each validation figure, over the steps."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from caldrive.episodes import write_whole
+from caldrive.perception.specs import SPECS
+
+SMOOTH = 50  # steps that the loss is averaged over
+
+
+def draw_curves(rows: Sequence[Mapping[str, float]], path: Path) -> None:
+    """Writes a PNG of a run's metrics, a row a step with `step`, `loss` and now and then `validation/<figure>`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 6), layout="constrained")
+    axes = figure.subplots(2, 4).ravel()
+    step, loss = (np.array([row[name] for row in rows]) for name in ("step", "loss"))
+    width = min(SMOOTH, len(rows))
+    axes[0].plot(step[width - 1 :], np.convolve(loss, np.full(width, 1 / width), "valid"), color="#3b6ea5")
+    axes[0].set(title=f"training loss, mean of {width} steps", yscale="log")
+    shown = ["loss", *(f"{spec.name}/{'iou' if spec.discrete else 'mae'}" for spec in SPECS)]
+    for ax, name in zip(axes[1:], shown, strict=True):
+        found = [(row["step"], row[f"validation/{name}"]) for row in rows if f"validation/{name}" in row]
+        ax.plot([at for at, _ in found], [value for _, value in found], "o-", color="#c8782d")
+        ax.set(title=f"validation, {name.replace('_', ' ')}", xlabel="step")
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=90)
+    write_whole(path, content.getvalue())

@@ -1,0 +1,80 @@
+"""What a recording holds: files checked to the last image, labels counted and drawn as histograms."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from caldrive.episodes import Episode, EpisodeError, read_episode, write_whole
+from caldrive.perception.dataset import class_counts
+from caldrive.perception.evaluation import Done, unwatched
+
+HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
+    "vehicle_distance": (np.linspace(0, 50, 26), "m"),
+    "relative_angle": (np.linspace(-0.8, 0.8, 41), "rad"),
+    "center_distance": (np.linspace(-2, 2, 41), "m"),
+    "speed": (np.linspace(0, 25, 26), "m/s"),
+}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What lies in a folder. minutes: simulated; weathers: episodes by weather; counts: frames by label and value;
+    damaged: a sentence for each file that is no use."""
+
+    episodes: int
+    frames: int
+    minutes: float
+    weathers: dict[str, int]
+    counts: dict[str, dict[str, int]]
+    damaged: tuple[str, ...]
+
+
+def check_episode(path: Path) -> Episode:
+    """An episode whose every image can be decoded. Raises EpisodeError where it has one that cannot."""
+    episode = read_episode(path)
+    for row in range(len(episode)):
+        episode.image(row)
+    return episode
+
+
+def check_recording(folder: Path, progress: Done = unwatched) -> tuple[Recording, list[Episode]]:
+    """Reads all episodes of a folder; returns what they hold, and those that are sound.
+
+    Raises EpisodeError where there is no episode at all.
+    """
+    paths = sorted(folder.glob("**/*.parquet"))
+    if not paths:
+        raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
+    sound, damaged = [], []
+    for k, path in enumerate(paths):
+        progress(k / len(paths))
+        try:
+            sound.append(check_episode(path))
+        except EpisodeError as error:
+            damaged.append(str(error))
+    minutes = sum(float(np.ptp(e.columns["time"])) for e in sound) / 60
+    weathers = Counter(str(e.scenario.weather) for e in sound)
+    counts = class_counts(sound) if sound else {}
+    return Recording(len(sound), sum(map(len, sound)), minutes, dict(weathers), counts, tuple(damaged)), sound
+
+
+def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], path: Path) -> None:
+    """A picture (PNG) of how often each value of each label occurs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 6), layout="constrained")
+    axes = figure.subplots(2, 4).ravel()
+    for ax, (name, values) in zip(axes, counts.items(), strict=False):
+        ax.bar(list(values), list(values.values()), color="#3b6ea5")
+        ax.set(title=name.replace("_", " "), yscale="log", ylabel="frames")
+    for ax, (name, (bins, unit)) in zip(axes[len(counts) :], HISTOGRAMS.items(), strict=False):
+        ax.hist(np.concatenate([e.columns[name] for e in episodes]), bins, color="#c8782d")
+        ax.set(title=name.replace("_", " "), yscale="log", xlabel=unit)
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=100)
+    write_whole(path, content.getvalue())

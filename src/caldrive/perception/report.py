@@ -1,0 +1,118 @@
+"""How well a network sees: figures by command, weather and town beside the paper's, confusion, and the worst frames."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from caldrive.episodes import write_whole
+from caldrive.perception.dataset import Frames, Ids
+from caldrive.perception.evaluation import Done, outputs_on, unwatched
+from caldrive.perception.network import COMMANDS, Network
+from caldrive.perception.specs import SPECS, Outputs, Spec, Targets, metrics
+
+# Supplement, comparison of temporal and non-temporal task blocks: the better of the two.
+PAPER = {
+    "hazard_stop/iou": 0.8741,
+    "red_light/iou": 0.9395,
+    "speed_sign/iou": 0.9271,
+    "vehicle_distance/mae_scaled": 0.03289,
+    "relative_angle/mae_scaled": 0.00207,
+    "center_distance/mae_scaled": 0.08465,
+}
+WORST = 4  # frames shown of each affordance
+APART = 30  # frames that lie at least between two of them
+
+
+@dataclass(frozen=True)
+class Report:
+    """frames: how many. overall: metrics by name. groups: by command, weather and town, the same for each value.
+    confusion: for each discrete affordance how many frames of each true class (rows) were seen as each (columns)."""
+
+    frames: int
+    overall: dict[str, float]
+    groups: dict[str, dict[str, dict[str, float]]]
+    confusion: dict[str, list[list[int]]]
+
+
+def _part(of: Outputs | Targets, rows: NDArray[np.bool_]) -> dict[str, torch.Tensor]:
+    chosen = torch.from_numpy(rows)
+    return {name: value[chosen] for name, value in of.items()}
+
+
+def _confusion(spec: Spec, outputs: Outputs, targets: Targets) -> list[list[int]]:
+    pairs = targets[spec.name] * spec.outputs + outputs[spec.name].argmax(1)
+    table: list[list[int]] = torch.bincount(pairs, minlength=spec.outputs**2).view(spec.outputs, -1).tolist()
+    return table
+
+
+def report(network: Network, frames: Frames, picture: Path | None = None, progress: Done = unwatched) -> Report:
+    """Runs the network over all frames. picture: where to draw the worst ones (PNG)."""
+    ids, outputs, targets = outputs_on(network, frames, progress=progress)
+    kinds: dict[str, NDArray[Any]] = {
+        "command": np.array([command.value for command in COMMANDS])[frames.command[ids]],
+        "weather": frames.weather[ids].astype(str),
+        "town": frames.town[ids],
+    }
+    groups = {
+        kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}
+        for kind, of in kinds.items()
+    }
+    confusion = {spec.name: _confusion(spec, outputs, targets) for spec in SPECS if spec.discrete}
+    if picture is not None:
+        draw_worst(frames, ids, outputs, targets, picture)
+    return Report(len(ids), metrics(outputs, targets), groups, confusion)
+
+
+def errors(spec: Spec, outputs: Outputs, targets: Targets) -> NDArray[np.float64]:
+    """How wrong each frame is (N,): in SI units, or the share of belief that the true class did not get."""
+    output, target = outputs[spec.name], targets[spec.name]
+    if spec.discrete:
+        return np.asarray(1 - output.softmax(1).gather(1, target[:, None])[:, 0].double())
+    return np.asarray((spec.decode(output) - target * spec.scale).abs().double())
+
+
+def worst(wrong: NDArray[np.float64], ids: Ids) -> list[int]:
+    """Rows of the largest errors, none of them a neighbour of another."""
+    chosen: list[int] = []
+    for row in np.argsort(-wrong, kind="stable").tolist():
+        if all(abs(int(ids[row]) - int(ids[one])) > APART for one in chosen):
+            chosen.append(row)
+        if len(chosen) == WORST:
+            break
+    return chosen
+
+
+def _said(spec: Spec, outputs: Outputs, targets: Targets, row: int) -> str:
+    if spec.discrete:
+        seen, true = (spec.classes[int(v)] for v in (outputs[spec.name][row].argmax(), targets[spec.name][row]))
+        return f"{spec.name.replace('_', ' ')}: {seen}, really {true}"
+    value, wanted = (
+        float(spec.decode(outputs[spec.name][row : row + 1])[0]),
+        float(targets[spec.name][row] * spec.scale),
+    )
+    return f"{spec.name.replace('_', ' ')}: {value:.2f}, really {wanted:.2f} {spec.unit}"
+
+
+def draw_worst(frames: Frames, ids: Ids, outputs: Outputs, targets: Targets, path: Path) -> None:
+    """A page (PNG) with the worst frames of each affordance, what was seen and what was true."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4 * WORST, 2.1 * len(SPECS)), layout="constrained")
+    axes = figure.subplots(len(SPECS), WORST, squeeze=False)
+    for line, spec in zip(axes, SPECS, strict=True):
+        for ax in line:
+            ax.set_axis_off()
+        for ax, row in zip(line, worst(errors(spec, outputs, targets), ids), strict=False):
+            episode, at = frames.source(int(ids[row]))
+            ax.imshow(episode.image(at))
+            ax.set_title(f"{_said(spec, outputs, targets, row)}\n{episode.id}, row {at}", fontsize=8)
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=100)
+    write_whole(path, content.getvalue())

@@ -1,0 +1,51 @@
+"""Checking a recording: what it holds, and which files are no use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from caldrive.episodes import EpisodeError
+from caldrive.perception.recordings import check_recording, draw_histograms
+from tests.perception_data import record
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return record(tmp_path, n_episodes=2, n_frames=11)
+
+
+def test_a_sound_recording_is_counted(folder: Path) -> None:
+    found, episodes = check_recording(folder)
+    assert (found.episodes, found.frames, found.damaged) == (2, 2 * 11 * 2, ())
+    assert found.minutes == pytest.approx(2 * 1.0 / 60)
+    assert found.weathers == {"1": 2}
+    assert sum(found.counts["hazard_stop"].values()) == found.frames
+    assert set(found.counts["command"]) == {"left", "straight", "right"}
+    assert len(episodes) == 2
+
+
+def test_a_cut_file_and_a_broken_image_are_named_and_the_rest_is_counted(folder: Path) -> None:
+    cut, spoilt, _ = (*sorted(folder.iterdir()), None)
+    content = spoilt.read_bytes()
+    at = content.index(b"\xff\xd8\xff", len(content) // 2)  # where a JPEG begins
+    spoilt.write_bytes(content[:at] + b"\x00\x00\x00" + content[at + 3 :])
+    cut.write_bytes(cut.read_bytes()[:1000])
+    record(folder / "more", n_episodes=1, n_frames=5)
+    found, _ = check_recording(folder)
+    assert found.episodes == 1
+    assert [name in sentence for name, sentence in zip((cut.name, spoilt.name), found.damaged, strict=True)] == [
+        True
+    ] * 2
+
+
+def test_an_empty_folder_says_what_to_type(tmp_path: Path) -> None:
+    with pytest.raises(EpisodeError, match="caldrive collect"):
+        check_recording(tmp_path)
+
+
+def test_histograms_are_a_picture(folder: Path, tmp_path: Path) -> None:
+    found, episodes = check_recording(folder)
+    draw_histograms(episodes, found.counts, tmp_path / "new" / "page.png")
+    assert (tmp_path / "new" / "page.png").read_bytes().startswith(b"\x89PNG")
