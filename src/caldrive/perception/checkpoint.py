@@ -74,11 +74,24 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return tensors, header
 
 
+def _is_weight(value: Tensor) -> bool:
+    """Not a bias, nor a statistic of a batch norm."""
+    return value.is_floating_point() and value.dim() > 1
+
+
+def halved(network: Network) -> Network:
+    """The network with its weights rounded to what 16 bits can hold, so that it is measured as it is stored."""
+    for value in network.state_dict().values():
+        if _is_weight(value):
+            value.copy_(value.half())
+    return network
+
+
 def save_network(path: Path | str, network: Network, info: CheckpointInfo, half: bool = False) -> None:
     """Write a network; `half` stores weights, though not batch norm's statistics, in 16 bits."""
     state = network.state_dict()
     if half:
-        state = {k: v.half() if v.is_floating_point() and v.dim() > 1 else v for k, v in state.items()}
+        state = {k: v.half() if _is_weight(v) else v for k, v in state.items()}
     write_tensors(Path(path), state, {"kind": "network", "specs": describe()} | asdict(info))
 
 

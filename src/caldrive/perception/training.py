@@ -18,7 +18,14 @@ from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.episodes import write_whole
-from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, read_tensors, save_network, write_tensors
+from caldrive.perception.checkpoint import (
+    CheckpointError,
+    CheckpointInfo,
+    halved,
+    read_tensors,
+    save_network,
+    write_tensors,
+)
 from caldrive.perception.curves import draw_curves
 from caldrive.perception.dataset import Frames, Sampler, find_episodes, split, summary
 from caldrive.perception.evaluation import autocast, evaluate, outputs_of
@@ -127,11 +134,13 @@ def calibrated(run: Run) -> Network:
 
 
 def _validate(run: Run, held: Frames, model: Path) -> Row:
-    """Write the network as it is, with its validation metrics, and return them as `validation/<name>`."""
-    network = calibrated(run)
+    """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`."""
+    network = halved(calibrated(run))
     found = evaluate(network, held, run.config.precision, run.config.device)
     data = summary(run.sampler.frames, held)
-    save_network(model, network, CheckpointInfo(network.config, data, found, asdict(run.config), run.config.seed))
+    save_network(
+        model, network, CheckpointInfo(network.config, data, found, asdict(run.config), run.config.seed), half=True
+    )
     return {f"validation/{name}": value for name, value in found.items()}
 
 
@@ -153,7 +162,8 @@ def train(
     """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
 
     In `out` lie also state.safetensors, from which the same call resumes, and metrics.jsonl: a row a step with its
-    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them. `stop` may end the run early after a step.
+    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them. `stop` may end the
+    run early after a step.
     """
     out, perception = Path(out), perception or PerceptionConfig()
     size = (perception.image_height, perception.image_width)
