@@ -12,6 +12,7 @@ from caldrive.datatypes import EpisodeResult, Outcome, Scenario, Step
 from caldrive.driving.drivers import chosen_scenarios, set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.outputs import require_writable_folder
+from caldrive.driving.plots import draw_speed
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriveSettings, Progress, silent
 from caldrive.driving.trace import Trace, episode_json, result_values
@@ -39,7 +40,8 @@ class DriveReport:
 
 
 def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
-    """Drive settings.episodes episodes; writes drive.mp4 and episode-000.json, 001, ... to settings.out.
+    """Drive settings.episodes episodes; writes episode-000.json, 001, ... to settings.out, and with the
+    video drive.mp4 also a plot of each episode's speed.
 
     Raises ValueError, FileNotFoundError, OSError or RuntimeError with what to type where it cannot be done.
     """
@@ -58,6 +60,8 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
             results.append(result)
             files.append(settings.out / f"episode-{k:03d}.json")
             write_whole(files[-1], episode_json(result, trace))
+            if settings.video:
+                draw_speed(trace.columns(), text, files[-1].with_suffix(".png"))
     return DriveReport(tuple(results), tuple(files), video.path if video.frames else None)
 
 

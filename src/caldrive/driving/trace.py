@@ -25,6 +25,7 @@ def plain(value: Any) -> Any:
 def _row(step: Step) -> dict[str, Any]:
     ego, seen, decision = step.truth.ego, step.observation, step.decision
     row: dict[str, Any] = {"time": seen.time, **asdict(ego.pose), "speed": seen.speed, "command": seen.command.value}
+    row |= {"route_done": step.truth.route_done, "road_limit": step.truth.speed_limit}
     row |= asdict(step.control)
     if decision is not None:
         row |= {"state": decision.state.value, "speed_limit": decision.speed_limit, "note": decision.note or None}
