@@ -141,6 +141,19 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
     assert contents(unbroken) == before
 
 
+@pytest.mark.parametrize("manifest", ["", "[1]", '{"town"'])
+def test_a_damaged_manifest_is_named(tmp_path: Path, manifest: str) -> None:
+    (tmp_path / "manifest.json").write_text(manifest)
+    with pytest.raises(ValueError, match=r"manifest\.json is damaged"):
+        next(collect(TINY, tmp_path))
+
+
+def test_episodes_of_unknown_origin_are_not_added_to(tmp_path: Path) -> None:
+    (tmp_path / "episode-00000.parquet").write_bytes(b"")
+    with pytest.raises(ValueError, match="says how they came"):
+        next(collect(TINY, tmp_path))
+
+
 controls = st.builds(
     lambda effort, steer: Control(max(effort, 0.0), max(-effort, 0.0), steer), st.floats(-1, 1), st.floats(-1, 1)
 )

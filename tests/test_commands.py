@@ -89,7 +89,9 @@ def test_drive_films_all_episodes_in_one_video(driven: tuple[dict[str, Any], Pat
         shapes = [(frame.width, frame.height) for frame in film.decode(video=0)]
         assert film.streams.video[0].average_rate == 10
     assert shapes == [SIZE] * (2 * (21 + 15))
-    assert sorted(p.name for p in out.iterdir()) == ["drive.mp4", "episode-000.json", "episode-001.json"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        *("drive.mp4", "episode-000.json", "episode-000.png", "episode-001.json", "episode-001.png")
+    ]
 
 
 def test_strict_ends_with_1_where_a_goal_was_not_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,7 +27,7 @@ def test_a_sound_recording_is_counted(folder: Path) -> None:
 
 
 def test_a_cut_file_and_a_broken_image_are_named_and_the_rest_is_counted(folder: Path) -> None:
-    cut, spoilt, _ = (*sorted(folder.iterdir()), None)
+    cut, spoilt = sorted(folder.iterdir())
     content = spoilt.read_bytes()
     at = content.index(b"\xff\xd8\xff", len(content) // 2)  # where a JPEG begins
     spoilt.write_bytes(content[:at] + b"\x00\x00\x00" + content[at + 3 :])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from caldrive.perception.dataset import Frames, find_episodes, held_out
+from caldrive.perception.dataset import Frames, find_episodes, held_out, split, summary
 from caldrive.perception.network import Network
 from caldrive.perception.report import APART, PAPER, errors, report, worst
 from caldrive.perception.specs import SPECS
@@ -23,6 +23,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Frames:
 
 def test_every_frame_counts_once_in_the_confusions_and_in_each_kind_of_group(frames: Frames, tmp_path: Path) -> None:
     found = report(Network(TINY), frames, tmp_path / "worst.png")
+    assert found.frames == len(frames)
     assert all(sum(map(sum, table)) == found.frames for table in found.confusion.values())
     assert set(found.groups) == {"command", "weather", "town"}
     assert set(found.groups["town"]) == {"town01"}
@@ -53,7 +54,10 @@ def test_the_worst_frames_are_not_neighbours() -> None:
 
 def test_held_out_episodes_are_those_of_the_training(frames: Frames, tmp_path: Path) -> None:
     episodes = find_episodes(record(tmp_path))
-    kept = held_out(episodes, {"validation_share": 0.05, "seed": 0})
-    assert len(kept) == 1
-    with pytest.raises(ValueError, match="leave --held-out away"):
-        held_out(episodes, {})
+    learnt, kept = split(episodes, 0.05, seed=0)
+    size = HEIGHT, WIDTH
+    data = summary(Frames(learnt, size), Frames(kept, size))
+    assert held_out(episodes, data) == kept
+    for known in ({}, data | {"validation_episodes": ["another/town01/1/7"]}):
+        with pytest.raises(ValueError, match="leave --held-out away"):
+            held_out(episodes, known)

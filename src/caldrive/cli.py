@@ -123,7 +123,9 @@ class Collect(CollectSettings, Output):
         from caldrive.perception.dataset import class_counts, find_episodes
 
         require_writable_folder(self.out)
-        config = CollectConfig(self.town, self.weathers, self.episodes, self.duration, seed=self.seed)
+        config = CollectConfig(
+            self.town, self.weathers, self.episodes, self.duration, width=self.width, height=self.height, seed=self.seed
+        )
         for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
             progress(f"recording, {done} done", done / self.episodes)
         counts = class_counts(find_episodes(self.out))
@@ -136,8 +138,10 @@ class Train(TrainSettings, Output):
         from dataclasses import replace
 
         from caldrive.config import PERCEPTIONS, TRAININGS
+        from caldrive.driving.outputs import require_writable_folder
         from caldrive.perception.training import train
 
+        require_writable_folder(self.out)
         if self.preset not in TRAININGS:
             raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
         config = replace(TRAININGS[self.preset], seed=self.seed)
@@ -156,12 +160,13 @@ class Data(DataSettings, Output):
         from caldrive.driving.tables_seen import recording_table
         from caldrive.perception.recordings import check_recording, draw_histograms
 
-        require_writable_file(self.picture)
+        require_writable_file(self.picture, "--picture")
         found, episodes = check_recording(self.folder, lambda share: progress("checking", share))
         if episodes:
             draw_histograms(episodes, found.counts, self.picture)
-        values = asdict(found) | {"picture": str(self.picture) if episodes else None}
-        return Answer(values, recording_table(self.folder, found, self.picture), int(bool(found.damaged)))
+        picture = self.picture if episodes else None
+        values = asdict(found) | {"picture": str(picture) if picture else None}
+        return Answer(values, recording_table(found, picture), int(bool(found.damaged)))
 
 
 @dataclass(frozen=True)
@@ -175,11 +180,11 @@ class Evaluate(EvaluateSettings, Output):
         from caldrive.perception.report import PAPER, report
 
         if self.worst is not None:
-            require_writable_file(self.worst)
+            require_writable_file(self.worst, "--worst")
         network, info = load_network(model_path(self.model))
         episodes = find_episodes(self.data)
         if self.held_out:
-            episodes = held_out(episodes, info.training)
+            episodes = held_out(episodes, info.data)
         frames = Frames(episodes, (network.config.image_height, network.config.image_width))
         found = report(network, frames, self.worst, lambda share: progress("evaluating", share))
         return Answer(asdict(found) | {"paper": PAPER}, evaluation_table(found))

@@ -75,10 +75,10 @@ class LongitudinalConfig:
     over_limit_margin: float = 3.0
     over_limit_ratio: float = 0.0
     over_limit_gain: float = 0.03
-    red_threshold: float = 0.9
+    red_threshold: float = 0.5
     red_gain: float = 1.5
     red_floor: float = 0.8
-    hazard_threshold: float = 0.95
+    hazard_threshold: float = 0.4
     hold_speed: float = 1.0
     hold_brake: float = 0.3
 

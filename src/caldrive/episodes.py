@@ -167,12 +167,19 @@ class Episode:
     def __len__(self) -> int:
         return len(self.jpegs)
 
+    @property
+    def key(self) -> str:
+        """Tells this recording from others that use the same id."""
+        return f"{self.id}/{self.scenario.town}/{self.scenario.weather}/{self.scenario.seed}"
+
     def image(self, i: int) -> Image:
         """Row i's image (H, W, 3), RGB. Raises EpisodeError where its bytes are damaged."""
         try:
             return np.asarray(simplejpeg.decode_jpeg(self.jpegs[i], colorspace="RGB"))
         except ValueError as error:
-            raise EpisodeError(f"row {i} of {self.path} holds a damaged image: record the episode again") from error
+            raise EpisodeError(
+                f"row {i} of {self.path} holds a damaged image: remove the file and record again"
+            ) from error
 
     def affordances(self, i: int) -> Affordances:
         """Row i's labels."""
@@ -210,10 +217,10 @@ def _header(path: Path, schema: pa.Schema) -> dict[str, Any]:
     header: dict[str, Any] = json.loads(metadata[METADATA_KEY])
     if header["version"] != FORMAT_VERSION:
         found = header["version"]
-        raise EpisodeError(f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: record the episode again")
+        raise EpisodeError(f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: record again")
     missing = [name for name in SCHEMA.names if name not in schema.names]
     if missing:
-        raise EpisodeError(f"{path} lacks the column {missing[0]}: record the episode again")
+        raise EpisodeError(f"{path} lacks the column {missing[0]}: remove it and record again")
     return header
 
 
@@ -226,10 +233,22 @@ def read_episode(path: Path | str) -> Episode:
         table = pq.read_table(path, memory_map=False, partitioning=None)
         header = _header(path, table.schema)
         scenario = scenario_from_json(header["scenario"])
+        table = table.sort_by([("camera", "ascending"), ("frame", "ascending")])
+        columns = {name: table[name].to_numpy() for name in SCHEMA.names if name != "image"}
+        _check_values(path, table, columns)
+        return Episode(path, str(header["id"]), scenario, columns, table["image"].to_pylist())
     except EpisodeError:
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
-        raise EpisodeError(f"{path} is damaged or no Parquet file ({type(error).__name__}): record it again") from error
-    table = table.sort_by([("camera", "ascending"), ("frame", "ascending")])
-    columns = {name: table[name].to_numpy() for name in SCHEMA.names if name != "image"}
-    return Episode(path, header["id"], scenario, columns, table["image"].to_pylist())
+        kind = type(error).__name__
+        raise EpisodeError(f"{path} is damaged or no Parquet file ({kind}): remove it and record again") from error
+
+
+def _check_values(path: Path, table: pa.Table, columns: dict[str, NDArray[Any]]) -> None:
+    """Raises EpisodeError where rows are missing or hold what no recorder writes."""
+    wrong = [name for name in SCHEMA.names if table[name].null_count]
+    wrong += [name for name, c in columns.items() if c.dtype.kind == "f" and not np.isfinite(c).all()]
+    wrong += ["command"] * (not set(columns["command"]) <= {command.value for command in Command})
+    if not len(table) or wrong:
+        what = f"values in {wrong[0]} that cannot be" if wrong else "no rows"
+        raise EpisodeError(f"{path} has {what}: remove it and record again")

@@ -16,6 +16,8 @@ Where DEFAULT differs, and why:
     over limit, brake       0.3 v / v*           0.03 (v - v_safe)   ends gently at the limit; heeds a car ahead, too
     red light, brake        0.2 v / 30           1.5 v / 30, >= 0.8  area A1 leaves 6.6 m to stand in; 0.2 v / 30 takes
                                                                      about 30 m from 30 km/h
+    hazard stop from        0.7                  0.4                 networks are calibrated: 0.4 is what they believe,
+    red light from          0.9                  0.5                 and a missed person is worse than a needless brake
     PID gains               the authors'         by step responses   less than 1 km/h too fast from 20 to 90 km/h
 """
 
@@ -40,6 +42,7 @@ PAPER = ControlConfig(
         red_gain=0.2,
         red_floor=0.0,
         hazard_threshold=0.7,
+        red_threshold=0.9,
         hold_speed=0.0,
         hold_brake=0.0,
     )

@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,8 @@ CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines
 @dataclass(frozen=True)
 class CollectConfig:
     """What to record. duration: s of an episode. crossing: how much more people cross than usual.
-    before_signs: share of the episodes that begin before a sign, hidden_cars: of those whose driver sees no car ahead.
+    before_signs: share of all episodes that begin before a sign. hidden_cars: share of all episodes whose driver is
+    told of no car ahead.
     """
 
     town: str = "town01"
@@ -175,17 +177,31 @@ def _record(config: CollectConfig, number: int, folder: Path) -> int:
     return record_episode(_world, config, number, folder)
 
 
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text())
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError(f"found that {path} is damaged, wanted a recording's settings: give another --out")
+    return found
+
+
 def _claim(folder: Path, config: CollectConfig) -> None:
     """Writes down what is recorded in a folder. Raises ValueError where that is something else already."""
     manifest = folder / MANIFEST
     wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION}))
     del wanted["episodes"]  # a recording may grow
-    found = json.loads(manifest.read_text()) if manifest.is_file() else wanted
+    if manifest.is_file():
+        found = _read_manifest(manifest)
+    elif any(folder.glob("*.parquet")):
+        raise ValueError(f"found episodes in {folder}, but no {MANIFEST} that says how they came: give another --out")
+    else:
+        found = wanted
     for name, value in wanted.items():
         if found.get(name) != value:
             raise ValueError(
-                f"found in {folder} a recording with {name} {found.get(name)}, wanted {value}: give another --out, or "
-                f"the settings in {manifest}"
+                f"found in {folder} a recording with {name} {found.get(name)}, wanted {value}: give another --out"
             )
     write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
 

@@ -109,6 +109,10 @@ class CollectSettings:
     """How many episodes the folder holds in the end."""
     duration: float = 40.0
     """Simulated seconds of each."""
+    width: int = 200
+    """Width of the images in pixels; the preset paper takes 320."""
+    height: int = 88
+    """Height of the images in pixels; the preset paper takes 144."""
     workers: int = 2
     """Processes that record at the same time."""
     seed: int = 0
@@ -122,7 +126,7 @@ class TrainSettings:
     data: Path = Path("out/recording")
     """Folder with the recorded episodes."""
     out: Path = Path("out/training")
-    """Folder for model.safetensors, the state of the run and its metrics."""
+    """Folder for model.safetensors, the state of the run, its metrics and their curves."""
     steps: int | None = None
     """Steps of the optimizer, where the preset's are not wanted."""
     preset: str = "small"

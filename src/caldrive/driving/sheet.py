@@ -22,7 +22,7 @@ def write_sheet(town: str, path: Path, width: int | None = None) -> tuple[int, i
         )
     if width is not None and not 16 <= width <= 16384:
         raise ValueError(f"found --width {width}, wanted 16 to 16384 pixels: type --width 1920")
-    require_writable_file(path)
+    require_writable_file(path, "--sheet")
     from caldrive.world.sheet import contact_sheet
 
     picture = Picture.fromarray(contact_sheet(town))

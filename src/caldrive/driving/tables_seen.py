@@ -13,34 +13,51 @@ from caldrive.perception.recordings import Recording
 from caldrive.perception.report import PAPER, Report
 from caldrive.perception.specs import SPECS
 
+FIGURES = {  # the heads of the columns, the metric in each, and the factor to its unit
+    "hazard IoU %": ("hazard_stop/iou", 100.0),
+    "red IoU %": ("red_light/iou", 100.0),
+    "sign IoU %": ("speed_sign/iou", 100.0),
+    "ahead m": ("vehicle_distance/mae", 1.0),
+    "angle rad": ("relative_angle/mae", 1.0),
+    "centre m": ("center_distance/mae", 1.0),
+}
+SCALES = {f"{spec.name}/mae": spec.scale for spec in SPECS}
 
-def recording_table(folder: Path, found: Recording, picture: Path) -> Group:
+
+def recording_table(found: Recording, picture: Path | None) -> Group:
     """What a recording holds, and its damaged files."""
-    weathers = ", ".join(f"weather {weather}: {n}" for weather, n in sorted(found.weathers.items()))
-    said = f"{found.episodes} episodes ({weathers}), {found.frames} frames, {found.minutes:.0f} minutes"
-    table = Table("label", "value", "frames", "share", box=SIMPLE_HEAD)
-    for name, values in found.counts.items():
-        for value, n in values.items():
-            table.add_row(name.replace("_", " "), value, str(n), f"{100 * n / found.frames:.1f} %")
+    weathers = ", ".join(f"{n} in weather {weather}" for weather, n in sorted(found.weathers.items(), key=_number))
+    shown: list[Table | Text] = [Text(f"{found.episodes} episodes: {weathers or 'none is sound'}")]
+    if picture is not None:
+        table = Table("label", "value", "frames", "share", box=SIMPLE_HEAD)
+        for name, values in found.counts.items():
+            for value, n in values.items():
+                table.add_row(name.replace("_", " "), value, str(n), f"{100 * n / found.frames:.1f} %")
+        shown += [Text(f"{found.frames} frames, {found.minutes:.0f} minutes"), table, Text(f"histograms: {picture}")]
     damaged = [Text(sentence, "red") for sentence in found.damaged] or [Text("no damaged file", "green")]
-    return Group(Text(said), table, *damaged, Text(f"histograms: {picture}"))
+    return Group(*shown, *damaged)
 
 
-def _figure(name: str, value: float) -> str:
-    return f"{100 * value:.1f} %" if name.endswith("/iou") else f"{value:.3g}"
+def _number(item: tuple[str, int]) -> int:
+    return int(item[0])
+
+
+def _papers(metric: str) -> float:
+    """The paper's figure, in SI units."""
+    return PAPER[metric] if metric in PAPER else PAPER[f"{metric}_scaled"] * SCALES[metric]
 
 
 def evaluation_table(found: Report) -> Group:
-    """Every figure over all frames, beside the paper's, and by command, weather and town; then the confusions."""
-    table = Table("figure", "all", "paper", box=SIMPLE_HEAD)
-    columns = [(kind, value) for kind, values in found.groups.items() for value in values]
-    for kind, value in columns:
-        table.add_column(f"{kind} {value}")
-    for name, overall in found.overall.items():
-        paper = _figure(name, PAPER[name]) if name in PAPER else ""
-        parts = [_figure(name, found.groups[kind][value][name]) for kind, value in columns]
-        table.add_row(name.replace("_", " "), _figure(name, overall), paper, *parts)
-    return Group(Text(f"{found.frames} frames"), table, *(_confusion(n, c) for n, c in found.confusion.items()))
+    """Mean IoU and MAE over all frames, as the paper has them, and by command, weather and town; confusions."""
+    table = Table("", *FIGURES, box=SIMPLE_HEAD)
+    rows = {
+        f"all {found.frames} frames": found.overall,
+        "the paper, in CARLA": {name: _papers(name) for name, _ in FIGURES.values()},
+    }
+    rows |= {f"{kind} {value}": figures for kind, values in found.groups.items() for value, figures in values.items()}
+    for name, figures in rows.items():
+        table.add_row(name, *(f"{factor * figures[metric]:.3g}" for metric, factor in FIGURES.values()))
+    return Group(table, *(_confusion(n, c) for n, c in found.confusion.items()))
 
 
 def _confusion(name: str, counts: list[list[int]]) -> Table:

@@ -79,12 +79,11 @@ def _is_weight(value: Tensor) -> bool:
     return value.is_floating_point() and value.dim() > 1
 
 
-def halved(network: Network) -> Network:
-    """The network with its weights rounded to what 16 bits can hold, so that it is measured as it is stored."""
+def round_to_half(network: Network) -> None:
+    """Rounds a network's weights in place to what 16 bits can hold, so that it is measured as it is stored."""
     for value in network.state_dict().values():
         if _is_weight(value):
             value.copy_(value.half())
-    return network
 
 
 def save_network(path: Path | str, network: Network, info: CheckpointInfo, half: bool = False) -> None:

@@ -69,14 +69,19 @@ def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Ep
     return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
 
 
-def held_out(episodes: Sequence[Episode], training: Mapping[str, Any]) -> list[Episode]:
-    """The episodes that a training with these settings keeps for validation. Raises EpisodeError where the settings
-    are not known."""
-    try:
-        share, seed = float(training["validation_share"]), int(training["seed"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise EpisodeError("the network does not say how it was trained: leave --held-out away") from error
-    return split(episodes, share, seed)[1]
+def held_out(episodes: Sequence[Episode], data: Mapping[str, Any]) -> list[Episode]:
+    """The episodes that a network's training kept for validation. data: what its checkpoint remembers (`summary`).
+
+    Raises EpisodeError where they are not all among these episodes.
+    """
+    wanted = set(data.get("validation_episodes", ()))
+    found = [episode for episode in episodes if episode.key in wanted]
+    if not wanted or len(found) != len(wanted):
+        raise EpisodeError(
+            f"found {len(found)} of the {len(wanted)} episodes that the network's training kept for validation: give "
+            "the folder that it was trained on with --data, or leave --held-out away"
+        )
+    return found
 
 
 class Frames:
@@ -215,6 +220,11 @@ def every_window(frames: Frames, window: int, batch: int) -> Iterator[Ids]:
 
 
 def summary(train: Frames, held: Frames) -> dict[str, Any]:
-    """What a checkpoint remembers of its data."""
+    """What a checkpoint remembers of its data. validation_episodes: keys of those that it never learnt from."""
     counts = {s.name: np.bincount(train.targets[s.name], minlength=s.outputs).tolist() for s in SPECS if s.discrete}
-    return {"train_frames": len(train), "validation_frames": len(held), "train_classes": counts}
+    return {
+        "train_frames": len(train),
+        "validation_frames": len(held),
+        "train_classes": counts,
+        "validation_episodes": sorted({held.source(i)[0].key for i in range(len(held))}),
+    }

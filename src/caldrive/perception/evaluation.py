@@ -15,7 +15,7 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.specs import Outputs, Targets, losses, metrics
 
-WINDOW = 16  # frames that are evaluated together
+BATCH = 128  # frames that are evaluated together
 Done = Callable[[float], None]  # told the share that is done
 
 
@@ -49,19 +49,16 @@ def outputs_of(network: Network, batch: Batch, images: Tensor, device: str) -> d
 def outputs_on(
     network: Network, frames: Frames, precision: str = "auto", device: str = "cpu", progress: Done = unwatched
 ) -> tuple[Ids, Outputs, Targets]:
-    """Numbers (N,) of all frames (but a stream's last few), outputs (N, K) and targets (N,) on them."""
+    """Numbers (N,) of all frames, outputs (N, K) and targets (N,) on them."""
     network.eval()
-    window = min(WINDOW, len(frames))
-    while not len(frames.starts(window)):
-        window //= 2
     ids, outputs, targets = [], [], []
-    for starts in every_window(frames, window, batch=8):
-        batch = frames.batch(starts, window, network.span - 1)
+    for starts in every_window(frames, 1, BATCH):
+        batch = frames.batch(starts, 1, network.span - 1)
         with autocast(precision, device):
             outputs.append(outputs_of(network, batch, normalise(to_float(batch.images)), device))
-        ids.append((starts[:, None] + np.arange(window)).ravel())
+        ids.append(starts)
         targets.append(batch.targets)
-        progress(float(ids[-1][-1]) / len(frames))
+        progress(float(starts[-1]) / len(frames))
     joined = {name: torch.cat([o[name].float().cpu() for o in outputs]) for name in outputs[0]}
     return np.concatenate(ids), joined, {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
 

@@ -1,4 +1,4 @@
-"""What a recording holds: files checked to the last image, labels counted and drawn as histograms."""
+"""What a recording holds: labels counted and drawn as histograms, after all values and images could be read."""
 
 from __future__ import annotations
 

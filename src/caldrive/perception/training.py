@@ -21,8 +21,8 @@ from caldrive.episodes import write_whole
 from caldrive.perception.checkpoint import (
     CheckpointError,
     CheckpointInfo,
-    halved,
     read_tensors,
+    round_to_half,
     save_network,
     write_tensors,
 )
@@ -120,14 +120,15 @@ def calibrated(run: Run) -> Network:
     """A copy of the network whose probabilities are those of the recording.
 
     Weighted and balanced, training sees rare classes as often as the others, and so the network expects them. Moving
-    each class's last bias by the logarithm of (its share of the frames / its share of the loss) takes that back.
+    each class's last bias by the logarithm of (its share of the frames / its share of the loss) takes that back; about,
+    as frames are drawn by the rarest of their labels, not by each.
     """
     network = copy.deepcopy(run.network)
     drawn = run.sampler.class_counts()
     for name, weight in run.weights.items():
         count = torch.bincount(run.sampler.frames.targets[name], minlength=len(weight)).double()
         weighted = weight.cpu().double() * torch.from_numpy(drawn[name])
-        shift = (count / weighted).nan_to_num(1.0, posinf=1.0).clamp(min=1e-9).log()
+        shift = (count / weighted).nan_to_num(0.0).clamp(min=1e-9).log()  # what never occurs is not expected
         bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
         bias.data += (shift - shift[0]).to(run.config.device)
     return network
@@ -135,7 +136,8 @@ def calibrated(run: Run) -> Network:
 
 def _validate(run: Run, held: Frames, model: Path) -> Row:
     """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`."""
-    network = halved(calibrated(run))
+    network = calibrated(run)
+    round_to_half(network)
     found = evaluate(network, held, run.config.precision, run.config.device)
     data = summary(run.sampler.frames, held)
     save_network(
@@ -184,11 +186,10 @@ def train(
             last = run.step == config.steps
             if last or run.step % config.evaluate_every == 0:
                 row |= _validate(run, held, model)
+                draw_curves([*rows, row], out / "curves.png")
             rows.append(row)
             if last or run.step % config.save_every == 0:
                 write_whole(log, "".join(json.dumps(r) + "\n" for r in rows).encode())
                 run.save(state)
             bar.update(task, completed=run.step, note=f"loss {row['loss']:.3f}")
-    if rows:
-        draw_curves(rows, out / "curves.png")
     return model
