@@ -4,7 +4,11 @@ BIN := .venv/bin
 READY := .venv/.ready
 ARGS ?=
 
-.PHONY: drive test lint clean
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+MODEL := out/model
+
+.PHONY: drive test lint model clean
 drive: $(READY)
 	$(BIN)/caldrive drive --task straight --cars 20 --people 50 --out out/drive $(ARGS)
 
@@ -16,6 +20,17 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# From nothing to the network that the package ships; a run that was stopped goes on. The log keeps every step's time.
+model: $(READY)
+	@mkdir -p $(MODEL)
+	@step() { echo "$$(date +%FT%T) caldrive $$*" | tee -a $(MODEL)/log.txt; $(BIN)/caldrive "$$@" | tee -a $(MODEL)/log.txt; }; \
+	step collect --out $(MODEL)/recording --episodes 240; \
+	step data $(MODEL)/recording --picture $(MODEL)/recording.png; \
+	step train --data $(MODEL)/recording --out $(MODEL)/training; \
+	step evaluate --data $(MODEL)/recording --model $(MODEL)/training/model.safetensors --held-out --worst $(MODEL)/worst.png; \
+	step drive --model $(MODEL)/training/model.safetensors --task one-turn --cap 20 --episodes 25 --no-video --out $(MODEL)/drive; \
+	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \

@@ -105,7 +105,7 @@ class CollectSettings:
     """town01 for training; town02 is for evaluation only."""
     weathers: tuple[int, ...] = (1, 3, 6, 8)
     """The weathers, in turn."""
-    episodes: int = 60
+    episodes: int = 240
     """How many episodes the folder holds in the end."""
     duration: float = 40.0
     """Simulated seconds of each."""
