@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,6 +140,26 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
     with pytest.raises(ValueError, match="a recording with seed 4, wanted 5"):
         next(collect(replace(TINY, seed=5, episodes=4), unbroken))
     assert contents(unbroken) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"town": "town09"}, "found town 'town09'"),
+        ({"weathers": (1, 15)}, "found weather 15"),
+        ({"weathers": ()}, "no weather"),
+        ({"width": 0}, "found --width 0"),
+        ({"duration": math.nan}, "found --duration nan"),
+        ({"episodes": 0}, "found --episodes 0"),
+        ({"seed": -1}, "found --seed -1"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_before_anything_is_written(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(ValueError, match=said):
+        next(collect(replace(TINY, **change), tmp_path / "new"))
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("manifest", ["", "[1]", '{"town"'])

@@ -25,6 +25,8 @@ from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame, write_whole
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.route import random_route
+from caldrive.world.towns import load_town
+from caldrive.world.weather import weather
 
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
@@ -142,10 +144,10 @@ def _set_up(
     roads = world.enter(config.town)
     start = starting_place(roads, config.before_signs, rng)
     route = random_route(roads, start, config.duration * 14 + 50, rng)
-    weather = config.weathers[number % len(config.weathers)]
+    under = config.weathers[number % len(config.weathers)]
     seed = int(rng.integers(2**31))
     scenario = Scenario(
-        config.town, weather, start, route.line.pose_at(route.length), config.cars, config.people, config.duration,
+        config.town, under, start, route.line.pose_at(route.length), config.cars, config.people, config.duration,
         seed, "collect", config.crossing,
     )  # fmt: skip
     cap = CAPS[int(rng.integers(len(CAPS)))]
@@ -175,6 +177,20 @@ def _record(config: CollectConfig, number: int, folder: Path) -> int:
     if _world is None:
         _world = EmbeddedWorld()
     return record_episode(_world, config, number, folder)
+
+
+def _check(config: CollectConfig, workers: int) -> None:
+    """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
+    least = {"episodes": 1, "duration": 0.1, "width": 16, "height": 16, "seed": 0, "workers": 1}
+    asked = asdict(config) | {"workers": workers}
+    for name, low in least.items():
+        if not asked[name] >= low:
+            raise ValueError(f"found --{name} {asked[name]}, wanted at least {low}: type --{name} {low}")
+    if not config.weathers:
+        raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 3 6 8")
+    for number in config.weathers:
+        weather(number)
+    load_town(config.town)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
@@ -211,6 +227,7 @@ def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[t
 
     Raises ValueError where the folder holds a recording with other settings.
     """
+    _check(config, workers)
     _claim(folder, config)
     missing = [k for k in range(config.episodes) if not episode_path(folder, k).exists()]
     if workers == 1:

@@ -25,7 +25,8 @@ WIDEST_CROSSING = 22.0  # m
 CORRIDOR = 2.05  # m to either side of a car's middle
 PATIENCE = 5.0  # s of waiting at the kerb before walking on, or on the road before turning back
 STOPPABLE_SPEED = 9.2  # m/s: from it a full brake stops within the hazard area A2
-MAY_GAIN = 2.0  # m/s² by which a moving car may speed up
+SEEN_FROM = 8.0  # m ahead of a car's front within which it may begin to brake for them
+MAY_GAIN = 3.0  # m/s² by which a moving car may speed up
 SPACE_PER_PERSON = 3.0  # m of sidewalk
 KERB = 1.2  # m from the middle of the sidewalk
 STRIDE = 0.05  # m between the places of a walk that are worked out beforehand
@@ -217,6 +218,10 @@ def may_walk(position: Points, way: Points, pace: Floats, cars: list[VehicleStat
         gained = np.where(moving, MAY_GAIN, 0.0) * arrives  # they reckon with a car that speeds up
         nearest, fastest = then - gained * arrives / 2, speed + gained
         room = np.where(fastest > STOPPABLE_SPEED, fastest * 4.5, 3.5 + fastest * 0.5 + fastest**2 / 10)
-        blocked = (then > -2 * half - 1.0) & (nearest < np.where(moving, room, 0.8))
+        # Until it sees them a car may speed up further: is it too fast by then, and there before they have left?
+        unseen, taken = np.maximum(nearest - SEEN_FROM, 0.0), 2 * CORRIDOR / pace[:, None]
+        too_fast = fastest**2 + 2 * MAY_GAIN * unseen > STOPPABLE_SPEED**2
+        surprised = moving & too_fast & (unseen < fastest * taken + MAY_GAIN * taken**2 / 2)
+        blocked = (then > -2 * half - 1.0) & ((nearest < np.where(moving, room, 0.8)) | surprised)
     free: NDArray[np.bool_] = ~(entering & blocked).any(1)
     return free

@@ -7,20 +7,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import libsumo
 import numpy as np
 
 from caldrive.datatypes import LightState, PedestrianState, Pose, VehicleState
-from caldrive.geometry import moved, wrap_angle
+from caldrive.geometry import moved, to_local, wrap_angle
 from caldrive.world.lights import Lights, Phase
 from caldrive.world.roads import Lane, RoadNetwork
 
 EGO = "ego"
+DRIVERS = Path(__file__).parent / "data" / "drivers.add.xml"
 SPACING = 12.0  # m of lane that a car takes at the start
 CLEAR_OF_EGO = 18.0  # m
-LONGEST_WAIT = 75.0  # s until a car that is stuck is moved elsewhere
-OUT_OF_SIGHT = 70.0  # m from the ego
+LONGEST_WAIT = 60.0  # s until a car that is stuck is moved elsewhere
+OUT_OF_SIGHT, BESIDE = 70.0, 25.0  # m from the ego, where its camera looks and elsewhere
 PEOPLE_AHEAD, COMFORTABLE_BRAKE = 30.0, 4.0  # m, m/s²
 MODELS = (("compact", 4.2, 1.76), ("estate", 4.6, 1.8), ("van", 4.9, 1.95))  # name, length, width in m
 _LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
@@ -37,18 +39,16 @@ class Traffic:
         arguments = [
             "-n", str(roads.network), "--step-length", str(dt), "--seed", str(seed % 2**31), "--no-step-log",
             "--no-warnings", "--time-to-teleport", "-1", "--collision.action", "none", "--start",
-            "--default.speeddev", "0.05",
+            "--default.speeddev", "0.05", "--additional-files", str(DRIVERS),
         ]  # fmt: skip
         if libsumo.isLoaded():
             libsumo.load(arguments)
         else:
             libsumo.start(["sumo", *arguments])
         for name, length, width in MODELS:
-            libsumo.vehicletype.copy("DEFAULT_VEHTYPE", name)
+            libsumo.vehicletype.copy("driver", name)
             libsumo.vehicletype.setLength(name, length)
             libsumo.vehicletype.setWidth(name, width)
-            libsumo.vehicletype.setEmergencyDecel(name, 9.0)
-            libsumo.vehicletype.setImperfection(name, 0.2)
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
         self._add_ego(ego)
         for name, (lane, s) in zip(self.size, self._places(n, ego), strict=True):
@@ -164,9 +164,9 @@ class Traffic:
             way, index = libsumo.vehicle.getRoute(name), libsumo.vehicle.getRouteIndex(name)
             if index >= 0 and len(way) - index < 6 and libsumo.vehicle.getRoadID(name) == way[index]:
                 libsumo.vehicle.setRoute(name, self._walk(way[index]))
-            x, y = libsumo.vehicle.getPosition(name)
-            seen = math.hypot(x - ego.pose.x, y - ego.pose.y) < OUT_OF_SIGHT
-            if libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT and not seen:
+            if libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT and not in_sight(
+                ego, libsumo.vehicle.getPosition(name)
+            ):
                 libsumo.vehicle.remove(name)
 
     def _state(self, name: str) -> VehicleState:
@@ -178,6 +178,13 @@ class Traffic:
 
     def _read(self) -> tuple[VehicleState, ...]:
         return tuple(self._state(name) for name in libsumo.vehicle.getIDList() if name != EGO)
+
+
+def in_sight(ego: VehicleState, place: tuple[float, float]) -> bool:
+    """Whether somebody at a place may be in the ego's pictures, or so close that others would notice."""
+    ahead, left = to_local(ego.pose, np.array(place)).tolist()
+    away = math.hypot(ahead, left)
+    return away < BESIDE or (away < OUT_OF_SIGHT and ahead > 0.5 * away)
 
 
 def _edge(lane: str) -> str:
