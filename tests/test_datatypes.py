@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, DriveState, Outcome, Pose
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, DriveState, Pose
+from caldrive.results import Outcome
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.floats(-1, 1))

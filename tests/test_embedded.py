@@ -15,21 +15,12 @@ import pytest
 
 from caldrive.config import CameraConfig, ControlConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import (
-    Agent,
-    Command,
-    ContactKind,
-    Control,
-    Outcome,
-    Pose,
-    Scenario,
-    Step,
-    Truth,
-    World,
-)
+from caldrive.datatypes import Command, ContactKind, Control, Pose, Scenario, Step, Truth
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.rollout import run_episode
 from caldrive.geometry import moved
+from caldrive.interfaces import Agent, World
+from caldrive.results import Outcome
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.route import plan_route

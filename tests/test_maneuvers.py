@@ -11,10 +11,11 @@ import pytest
 from caldrive.config import KMH
 from caldrive.control.controller import Controller
 from caldrive.control.presets import DEFAULT
-from caldrive.datatypes import Command, DriveState, InfractionKind, Pose, Scenario, Step
+from caldrive.datatypes import Command, DriveState, Pose, Scenario, Step
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import rollout
+from caldrive.results import InfractionKind
 from tests.fakes import CAR, StraightRoad, turn_route
 
 ORIGIN = Pose(0, 0, 0)

@@ -139,6 +139,13 @@ def car(speed: float, heading: float = 0.0) -> VehicleState:
 OVER_THE_LANE = (0.0, 7.0)  # m, from the kerb right of a car
 
 
+@pytest.mark.parametrize(("ahead", "speed", "free"), [(25.0, 6.0, False), (60.0, 6.0, True), (25.0, 0.0, True)])
+def test_people_reckon_with_a_slow_car_that_speeds_up_before_it_sees_them(
+    ahead: float, speed: float, free: bool
+) -> None:
+    assert may(car(speed), 2.1 + ahead, -2.2, *OVER_THE_LANE) is free
+
+
 @pytest.mark.parametrize("ahead", [4.0, 10.0, 20.0])
 def test_nobody_steps_in_front_of_a_fast_car(ahead: float) -> None:
     assert not may(car(14.0), 2.1 + ahead, -2.2, *OVER_THE_LANE)

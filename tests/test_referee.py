@@ -9,9 +9,7 @@ from caldrive.datatypes import (
     Affordances,
     Contact,
     ContactKind,
-    InfractionKind,
     LightState,
-    Outcome,
     Pose,
     Scenario,
     TrafficLight,
@@ -19,6 +17,7 @@ from caldrive.datatypes import (
     VehicleState,
 )
 from caldrive.driving.referee import REST_FRAMES, Referee, comfort
+from caldrive.results import InfractionKind, Outcome
 
 SCENARIO = Scenario("town", 1, Pose(0, 0, 0), Pose(1000, 0, 0), time_limit=1000.0)
 SHARES = [

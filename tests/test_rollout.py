@@ -7,9 +7,10 @@ import pytest
 
 from caldrive.control.controller import Controller
 from caldrive.control.presets import DEFAULT
-from caldrive.datatypes import Affordances, InfractionKind, Outcome, Pose, Scenario, Step
+from caldrive.datatypes import Affordances, Pose, Scenario, Step
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.rollout import rollout, run_episode
+from caldrive.results import InfractionKind, Outcome
 from tests.fakes import StraightRoad
 
 SCENARIO = Scenario("straight", 1, Pose(0, 0, 0), Pose(100, 0, 0), time_limit=30)

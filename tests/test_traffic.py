@@ -14,7 +14,7 @@ from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, 
 from caldrive.geometry import box_corners, boxes_overlap, moved, segments_cross, to_local, wrap_angle
 from caldrive.world.lights import Lights
 from caldrive.world.roads import Lane, RoadNetwork
-from caldrive.world.traffic import Traffic, stop_sumo
+from caldrive.world.traffic import Traffic, in_sight, stop_sumo
 
 DT = 0.1
 Cars = tuple[VehicleState, ...]
@@ -230,3 +230,11 @@ def test_nobody_brakes_for_people_on_the_sidewalk(town02: RoadNetwork, usual: li
     onlookers = [someone_before(car, 6.0) for car in usual[0].cars]
     calm = [PedestrianState(p.pose, 0.0, on_road=False, id=p.id) for p in onlookers]
     assert drive(town02, 15, 10, people=lambda _: calm)[-1].cars == usual[99].cars
+
+
+@pytest.mark.parametrize(
+    ("ahead", "left", "seen"), [(60, 0, True), (80, 0, False), (-20, 0, True), (-30, 0, False), (10, 40, False)]
+)
+def test_stuck_cars_are_moved_only_where_the_ego_does_not_look(ahead: float, left: float, seen: bool) -> None:
+    ego = VehicleState(Pose(5, 5, math.pi / 2), 0.0, 4.2, 1.8, "ego")
+    assert in_sight(ego, (5 - left, 5 + ahead)) is seen

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
-from caldrive.perception.dataset import Frames, find_episodes
+from caldrive.perception.dataset import Frames, find_episodes, split
 from caldrive.perception.evaluation import evaluate, outputs_of, use_bf16
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
@@ -63,7 +63,9 @@ def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, 
     rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").open()]
     assert [row["step"] for row in rows if "validation/loss" in row] == [3, 6]
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
-    info = load_network(model)[1]
+    network, info = load_network(model)
+    held = split(find_episodes(folder), SHORT.validation_share, SHORT.seed)[1]
+    assert evaluate(network, Frames(held, (HEIGHT, WIDTH)), "fp32") == info.metrics  # what is stored was measured
     assert info.metrics["loss"] == rows[-1]["validation/loss"]
     assert info.data["validation_frames"] == 80
 

@@ -16,12 +16,8 @@ from caldrive.datatypes import (
     Control,
     Decision,
     DriveState,
-    EpisodeResult,
     Image,
-    Infraction,
-    InfractionKind,
     Observation,
-    Outcome,
     Pose,
     Scenario,
     Step,
@@ -34,6 +30,7 @@ from caldrive.driving.minimap import EGO, GOAL, ROUTE, MiniMap
 from caldrive.driving.palette import AMBER, GREEN, RED
 from caldrive.driving.tasks import scenarios
 from caldrive.driving.video import VideoWriter
+from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.world.route import plan_route
 from caldrive.world.towns import load_town
 

@@ -25,7 +25,7 @@ _HOMES = {
     "caldrive.config": ("CameraConfig", "ControlConfig"),
     "caldrive.control.controller": ("Controller",),
     "caldrive.datatypes": (
-        *("Affordances", "Command", "Control", "EpisodeResult", "Observation", "Outcome"),
+        *("Affordances", "Command", "Control", "Observation"),
         *("Pose", "Scenario", "Step", "Truth"),
     ),
     "caldrive.driving.agent": ("CALAgent", "OraclePerception"),
@@ -35,6 +35,7 @@ _HOMES = {
     "caldrive.driving.settings": ("DriveSettings",),
     "caldrive.driving.tasks": ("scenarios",),
     "caldrive.perception.predictor": ("NetworkPerception",),
+    "caldrive.results": ("EpisodeResult", "Outcome"),
     "caldrive.world.embedded": ("EmbeddedWorld",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -1,4 +1,4 @@
-"""The vocabulary that every part of caldrive shares: frozen dataclasses and three protocols.
+"""The vocabulary that every part of caldrive shares, as frozen dataclasses.
 
 Units are SI, axes are ISO 8855: x forward (or east), y left (or north), headings counter-clockwise in radians.
 Speeds on signs are the one exception: they are the km/h that stand on the sign.
@@ -7,9 +7,8 @@ Speeds on signs are the one exception: they are the km/h that stand on the sign.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,72 +215,3 @@ class Step:
     truth: Truth
     control: Control
     decision: Decision | None = None
-
-
-class Outcome(Enum):
-    """How an episode ended, as a message."""
-
-    SUCCESS = "reached the goal in time"
-    TIMEOUT = "ran out of time"
-    ABORTED = "was stopped before its end"
-
-
-class InfractionKind(Enum):
-    """The paper's six kinds of infraction (section 3)."""
-
-    OPPOSITE_LANE = "opposite lane"
-    SIDEWALK = "sidewalk"
-    RED_LIGHT = "red light"
-    COLLISION_OBJECT = "collision with object"
-    COLLISION_CAR = "collision with car"
-    COLLISION_PERSON = "collision with person"
-
-
-@dataclass(frozen=True)
-class Infraction:
-    kind: InfractionKind
-    time: float
-    x: float
-    y: float
-    at_fault: bool = True
-
-
-@dataclass(frozen=True)
-class EpisodeResult:
-    """duration in s, distance in m, route_done and route_length in m, comfort: figures by name."""
-
-    scenario: Scenario
-    outcome: Outcome
-    duration: float
-    distance: float
-    route_done: float
-    route_length: float
-    infractions: tuple[Infraction, ...] = ()
-    comfort: dict[str, float] = field(default_factory=dict)
-
-
-class World(Protocol):
-    """A place to drive. dt: seconds of one step."""
-
-    dt: float
-
-    def reset(self, scenario: Scenario) -> Observation: ...
-    def step(self, control: Control) -> Observation: ...
-    def truth(self) -> Truth: ...
-    def close(self) -> None: ...
-
-
-class Perception(Protocol):
-    """Image to affordances. reset() starts an episode."""
-
-    def reset(self) -> None: ...
-    def predict(self, observation: Observation) -> Affordances: ...
-
-
-class Agent(Protocol):
-    """A driver. decision holds the reasons for the last control, where the agent has any."""
-
-    decision: Decision | None
-
-    def reset(self) -> None: ...
-    def act(self, observation: Observation) -> Control: ...

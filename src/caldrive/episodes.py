@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -23,6 +22,7 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Affordances, Command, Control, Image, Pose, Scenario
+from caldrive.files import write_whole
 
 FORMAT_VERSION = 1
 METADATA_KEY = b"caldrive"
@@ -136,17 +136,6 @@ class EpisodeWriter:
         if kind is None:
             self.close()
         self._rows = []
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it appears whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)

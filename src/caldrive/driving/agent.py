@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from caldrive.control.controller import Controller
-from caldrive.datatypes import Affordances, Control, Decision, Observation, Perception, Truth
+from caldrive.datatypes import Affordances, Control, Decision, Observation, Truth
+from caldrive.interfaces import Perception
 
 NOTHING = Affordances(*(math.nan,) * 2, None, *(math.nan,) * 3)  # what an image tells that is no use
 

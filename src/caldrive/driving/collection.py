@@ -21,7 +21,8 @@ from caldrive.config import CameraConfig, ControlConfig
 from caldrive.control.controller import Controller
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Pose, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
-from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame, write_whole
+from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
+from caldrive.files import write_whole
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.route import random_route
@@ -43,7 +44,7 @@ class CollectConfig:
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 3, 6, 8)
-    episodes: int = 80
+    episodes: int = 240
     duration: float = 40.0
     cars: int = 20
     people: int = 70

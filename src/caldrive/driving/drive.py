@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from caldrive.datatypes import EpisodeResult, Outcome, Scenario, Step
+from caldrive.datatypes import Scenario, Step
 from caldrive.driving.drivers import chosen_scenarios, set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.outputs import require_writable_folder
@@ -17,7 +17,8 @@ from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriveSettings, Progress, silent
 from caldrive.driving.trace import Trace, episode_json, result_values
 from caldrive.driving.video import VideoWriter
-from caldrive.episodes import write_whole
+from caldrive.files import write_whole
+from caldrive.results import EpisodeResult, Outcome
 
 
 @dataclass(frozen=True)

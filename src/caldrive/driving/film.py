@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from caldrive.datatypes import EpisodeResult, Image, Scenario, Step
+from caldrive.datatypes import Image, Scenario, Step
 from caldrive.driving.hud import CAMERA, PANEL, Hud, with_outcome
 from caldrive.driving.minimap import MiniMap
 from caldrive.driving.referee import Referee
 from caldrive.driving.video import VideoWriter
+from caldrive.results import EpisodeResult
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.weather import weather
 

@@ -10,7 +10,7 @@ from PIL import Image as Picture
 from PIL import ImageDraw
 
 from caldrive.config import KMH, CameraConfig
-from caldrive.datatypes import Command, Decision, DriveState, EpisodeResult, Image, Infraction, Outcome, Step
+from caldrive.datatypes import Command, Decision, DriveState, Image, Step
 from caldrive.driving.gauges import draw_frame, draw_gauges
 from caldrive.driving.minimap import MiniMap
 from caldrive.driving.palette import (
@@ -29,6 +29,7 @@ from caldrive.driving.palette import (
     track,
     write,
 )
+from caldrive.results import EpisodeResult, Infraction, Outcome
 
 CAMERA = CameraConfig(width=960, height=432)
 PANEL = 224  # pixels of height under the camera's picture

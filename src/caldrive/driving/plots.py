@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from caldrive.config import KMH
 from caldrive.datatypes import DriveState
-from caldrive.episodes import write_whole
+from caldrive.files import write_figure
 
 SHADES = {
     DriveState.HAZARD_STOP.value: "#d9534f",
@@ -42,6 +41,4 @@ def draw_speed(columns: Mapping[str, Sequence[Any]], title: str, path: Path) -> 
     ax.plot(done, np.array(columns["speed"]) / KMH, color="#1f4e79", lw=2, label="speed")
     ax.set(title=title, xlabel="m along the route", ylabel="km/h", xlim=(0, None), ylim=(0, None))
     figure.legend(loc="outside right upper", fontsize=8)
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=90)
-    write_whole(path, content.getvalue())
+    write_figure(path, figure)

@@ -11,19 +11,9 @@ from collections import deque
 
 import numpy as np
 
-from caldrive.datatypes import (
-    ContactKind,
-    EpisodeResult,
-    Infraction,
-    InfractionKind,
-    LightState,
-    Outcome,
-    Scenario,
-    TrafficLight,
-    Truth,
-    VehicleState,
-)
+from caldrive.datatypes import ContactKind, LightState, Scenario, TrafficLight, Truth, VehicleState
 from caldrive.geometry import wrap_angle
+from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 
 GOAL_RADIUS = 2.0  # m
 RISE_FRAMES = 10

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from caldrive.datatypes import Agent, EpisodeResult, Scenario, Step, World
+from caldrive.datatypes import Scenario, Step
 from caldrive.driving.referee import Referee
+from caldrive.interfaces import Agent, World
+from caldrive.results import EpisodeResult
 
 
 def rollout(world: World, agent: Agent, scenario: Scenario) -> Iterator[Step]:

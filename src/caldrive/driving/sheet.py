@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL import Image as Picture
 
 from caldrive.driving.outputs import require_writable_file
-from caldrive.episodes import write_whole
+from caldrive.files import write_whole
 
 
 def write_sheet(town: str, path: Path, width: int | None = None) -> tuple[int, int]:

@@ -10,10 +10,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from caldrive.datatypes import EpisodeResult, Outcome
 from caldrive.driving.drive import DriveReport
 from caldrive.driving.speed import WorldSpeed
 from caldrive.driving.trace import mean_speed
+from caldrive.results import EpisodeResult, Outcome
 
 
 def infraction_counts(result: EpisodeResult) -> dict[str, int]:

@@ -8,8 +8,9 @@ from dataclasses import asdict
 from typing import Any
 
 from caldrive.config import KMH
-from caldrive.datatypes import Affordances, EpisodeResult, Step
+from caldrive.datatypes import Affordances, Step
 from caldrive.episodes import scenario_to_json
+from caldrive.results import EpisodeResult
 
 TRACE_VERSION = 1
 DIGITS = 4

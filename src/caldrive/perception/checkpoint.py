@@ -15,7 +15,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from caldrive.config import BlockConfig, PerceptionConfig
-from caldrive.episodes import write_whole
+from caldrive.files import write_whole
 from caldrive.perception.network import Network
 from caldrive.perception.specs import describe
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from caldrive.episodes import write_whole
+from caldrive.files import write_figure
 from caldrive.perception.specs import SPECS
 
 SMOOTH = 50  # steps that the loss is averaged over
@@ -29,6 +28,4 @@ def draw_curves(rows: Sequence[Mapping[str, float]], path: Path) -> None:
         found = [(row["step"], row[f"validation/{name}"]) for row in rows if f"validation/{name}" in row]
         ax.plot([at for at, _ in found], [value for _, value in found], "o-", color="#c8782d")
         ax.set(title=f"validation, {name.replace('_', ' ')}", xlabel="step")
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=90)
-    write_whole(path, content.getvalue())
+    write_figure(path, figure)

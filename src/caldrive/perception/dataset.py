@@ -37,12 +37,17 @@ class Batch:
     targets: dict[str, Tensor]
 
 
-def find_episodes(folder: Path | str) -> list[Episode]:
-    """All episodes of a folder by name. Raises EpisodeError where there is none."""
+def episode_paths(folder: Path | str) -> list[Path]:
+    """The files of a folder's episodes by name. Raises EpisodeError where there is none."""
     paths = sorted(Path(folder).glob("**/*.parquet"))
     if not paths:
         raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
-    return [read_episode(path) for path in paths]
+    return paths
+
+
+def find_episodes(folder: Path | str) -> list[Episode]:
+    """All episodes of a folder by name. Raises EpisodeError where there is none, or one is damaged."""
+    return [read_episode(path) for path in episode_paths(folder)]
 
 
 def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from caldrive.episodes import Episode, EpisodeError, read_episode, write_whole
-from caldrive.perception.dataset import class_counts
+from caldrive.episodes import Episode, EpisodeError, read_episode
+from caldrive.files import write_figure
+from caldrive.perception.dataset import class_counts, episode_paths
 from caldrive.perception.evaluation import Done, unwatched
 
 HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
@@ -47,9 +47,7 @@ def check_recording(folder: Path, progress: Done = unwatched) -> tuple[Recording
 
     Raises EpisodeError where there is no episode at all.
     """
-    paths = sorted(folder.glob("**/*.parquet"))
-    if not paths:
-        raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
+    paths = episode_paths(folder)
     sound, damaged = [], []
     for k, path in enumerate(paths):
         progress(k / len(paths))
@@ -75,6 +73,4 @@ def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], 
     for ax, (name, (bins, unit)) in zip(axes[len(counts) :], HISTOGRAMS.items(), strict=False):
         ax.hist(np.concatenate([e.columns[name] for e in episodes]), bins, color="#c8782d")
         ax.set(title=name.replace("_", " "), yscale="log", xlabel=unit)
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=100)
-    write_whole(path, content.getvalue())
+    write_figure(path, figure)

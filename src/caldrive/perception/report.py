@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +10,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from caldrive.episodes import write_whole
+from caldrive.files import write_figure
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.evaluation import Done, outputs_on, unwatched
 from caldrive.perception.network import COMMANDS, Network
-from caldrive.perception.specs import SPECS, Outputs, Spec, Targets, metrics
+from caldrive.perception.specs import SPECS, Outputs, Spec, Targets, confusion, metrics
 
 # Supplement, comparison of temporal and non-temporal task blocks: the better of the two.
 PAPER = {
@@ -46,12 +45,6 @@ def _part(of: Outputs | Targets, rows: NDArray[np.bool_]) -> dict[str, torch.Ten
     return {name: value[chosen] for name, value in of.items()}
 
 
-def _confusion(spec: Spec, outputs: Outputs, targets: Targets) -> list[list[int]]:
-    pairs = targets[spec.name] * spec.outputs + outputs[spec.name].argmax(1)
-    table: list[list[int]] = torch.bincount(pairs, minlength=spec.outputs**2).view(spec.outputs, -1).tolist()
-    return table
-
-
 def report(network: Network, frames: Frames, picture: Path | None = None, progress: Done = unwatched) -> Report:
     """Runs the network over all frames. picture: where to draw the worst ones (PNG)."""
     ids, outputs, targets = outputs_on(network, frames, progress=progress)
@@ -64,10 +57,14 @@ def report(network: Network, frames: Frames, picture: Path | None = None, progre
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}
         for kind, of in kinds.items()
     }
-    confusion = {spec.name: _confusion(spec, outputs, targets) for spec in SPECS if spec.discrete}
+    confused = {
+        spec.name: confusion(outputs[spec.name].argmax(1), targets[spec.name], spec.outputs).tolist()
+        for spec in SPECS
+        if spec.discrete
+    }
     if picture is not None:
         draw_worst(frames, ids, outputs, targets, picture)
-    return Report(len(ids), metrics(outputs, targets), groups, confusion)
+    return Report(len(ids), metrics(outputs, targets), groups, confused)
 
 
 def errors(spec: Spec, outputs: Outputs, targets: Targets) -> NDArray[np.float64]:
@@ -93,10 +90,8 @@ def _said(spec: Spec, outputs: Outputs, targets: Targets, row: int) -> str:
     if spec.discrete:
         seen, true = (spec.classes[int(v)] for v in (outputs[spec.name][row].argmax(), targets[spec.name][row]))
         return f"{spec.name.replace('_', ' ')}: {seen}, really {true}"
-    value, wanted = (
-        float(spec.decode(outputs[spec.name][row : row + 1])[0]),
-        float(targets[spec.name][row] * spec.scale),
-    )
+    value = float(spec.decode(outputs[spec.name][row : row + 1])[0])
+    wanted = float(targets[spec.name][row] * spec.scale)
     return f"{spec.name.replace('_', ' ')}: {value:.2f}, really {wanted:.2f} {spec.unit}"
 
 
@@ -113,6 +108,4 @@ def draw_worst(frames: Frames, ids: Ids, outputs: Outputs, targets: Targets, pat
             episode, at = frames.source(int(ids[row]))
             ax.imshow(episode.image(at))
             ax.set_title(f"{_said(spec, outputs, targets, row)}\n{episode.id}, row {at}", fontsize=8)
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=100)
-    write_whole(path, content.getvalue())
+    write_figure(path, figure)

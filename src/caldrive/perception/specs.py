@@ -126,13 +126,16 @@ def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None
     return torch.stack(list(losses(outputs, targets, weights).values())).sum()
 
 
+def confusion(predicted: Tensor, target: Tensor, n_classes: int) -> Tensor:
+    """How many of the samples (N,) of each true class (row) were seen as each class (column)."""
+    return torch.bincount(target * n_classes + predicted, minlength=n_classes**2).view(n_classes, n_classes)
+
+
 def mean_iou(predicted: Tensor, target: Tensor, n_classes: int) -> float:
     """Mean over the classes that occur of intersection over union of predicted and true samples (N,)."""
-    confusion = (
-        torch.bincount(target * n_classes + predicted, minlength=n_classes**2).view(n_classes, n_classes).double()
-    )
-    hits = confusion.diagonal()
-    union = confusion.sum(0) + confusion.sum(1) - hits
+    counts = confusion(predicted, target, n_classes).double()
+    hits = counts.diagonal()
+    union = counts.sum(0) + counts.sum(1) - hits
     return float((hits[union > 0] / union[union > 0]).mean())
 
 

@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
-from caldrive.episodes import write_whole
+from caldrive.files import write_whole
 from caldrive.perception.checkpoint import (
     CheckpointError,
     CheckpointInfo,

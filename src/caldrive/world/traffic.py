@@ -164,9 +164,8 @@ class Traffic:
             way, index = libsumo.vehicle.getRoute(name), libsumo.vehicle.getRouteIndex(name)
             if index >= 0 and len(way) - index < 6 and libsumo.vehicle.getRoadID(name) == way[index]:
                 libsumo.vehicle.setRoute(name, self._walk(way[index]))
-            if libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT and not in_sight(
-                ego, libsumo.vehicle.getPosition(name)
-            ):
+            stuck = libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT
+            if stuck and not in_sight(ego, libsumo.vehicle.getPosition(name)):
                 libsumo.vehicle.remove(name)
 
     def _state(self, name: str) -> VehicleState:

@@ -1,0 +1,199 @@
+"""The verbs of the command line: each holds its options, calls one function and says what that found.
+
+What a verb needs is imported when it runs, so that `caldrive --help` waits for nothing.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from tyro.conf import subcommand
+
+from caldrive.driving.settings import (
+    AgentSpeedSettings,
+    CollectSettings,
+    DataSettings,
+    DeterminismSettings,
+    DriveSettings,
+    EvaluateSettings,
+    Progress,
+    TrainSettings,
+    WorldSpeedSettings,
+)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command found: values for --json, something to show to people, and the exit code."""
+
+    values: dict[str, Any]
+    shown: Any
+    code: int = 0
+
+
+@dataclass(frozen=True)
+class Output:
+    json: bool = False
+    """Print the result as JSON, and nothing else."""
+
+
+@dataclass(frozen=True)
+class Drive(DriveSettings, Output):
+    strict: bool = False
+    """End with exit code 1 unless every episode reached its goal."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.drive import drive
+        from caldrive.driving.tables import drive_table
+
+        report = drive(self, progress)
+        return Answer(report.values(), drive_table(report), int(self.strict and not report.all_reached))
+
+
+@dataclass(frozen=True)
+class Town(Output):
+    town: str = "town01"
+    """town01, town02 or an OpenDRIVE file."""
+    sheet: Path = Path("out/town.png")
+    """The PNG file to write."""
+    width: int | None = None
+    """Its width in pixels."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.sheet import write_sheet
+
+        progress("drawing", 0.0)
+        width, height = write_sheet(self.town, self.sheet, self.width)
+        values = {"town": self.town, "sheet": str(self.sheet), "width": width, "height": height}
+        return Answer(values, f"{self.town} on one page: {self.sheet} ({width} x {height})")
+
+
+@dataclass(frozen=True)
+class WorldSpeed(WorldSpeedSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.speed import measure_world
+
+        speed = measure_world(self, progress)  # times the imports, too: nothing is loaded before it
+        from caldrive.driving.tables import world_table
+
+        return Answer(asdict(speed), world_table(speed))
+
+
+@dataclass(frozen=True)
+class AgentSpeed(AgentSpeedSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.speed import measure_agent
+
+        speed = measure_agent(self, progress)
+        said = (
+            f"from image to control: {speed.median_ms:.1f} ms at the median, {speed.p99_ms:.1f} ms in 99 of 100 cases"
+        )
+        return Answer(asdict(speed), f"{said} ({speed.width} x {speed.height})")
+
+
+@dataclass(frozen=True)
+class Determinism(DeterminismSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.determinism import check_determinism
+
+        found = check_determinism(self, progress)
+        said = found.difference or f"equal in all {found.steps} steps, sha256 {found.digest[:16]}"
+        return Answer(asdict(found) | {"equal": found.equal}, said, int(not found.equal))
+
+
+@dataclass(frozen=True)
+class Collect(CollectSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.collection import CollectConfig, collect
+        from caldrive.driving.outputs import require_writable_folder
+        from caldrive.driving.tables import counts_table
+        from caldrive.perception.dataset import class_counts, find_episodes
+
+        require_writable_folder(self.out)
+        config = CollectConfig(
+            self.town, self.weathers, self.episodes, self.duration, width=self.width, height=self.height, seed=self.seed
+        )
+        for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
+            progress(f"recording, {done} done", done / self.episodes)
+        counts = class_counts(find_episodes(self.out))
+        return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
+
+
+@dataclass(frozen=True)
+class Train(TrainSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from dataclasses import replace
+
+        from caldrive.config import PERCEPTIONS, TRAININGS
+        from caldrive.driving.outputs import require_writable_folder
+        from caldrive.perception.training import train
+
+        require_writable_folder(self.out)
+        if self.preset not in TRAININGS:
+            raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
+        config = replace(TRAININGS[self.preset], seed=self.seed)
+        config = config if self.steps is None else replace(config, steps=self.steps)
+        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], progress=sys.stderr.isatty())
+        return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
+
+
+@dataclass(frozen=True)
+class Data(DataSettings, Output):
+    folder: tyro.conf.Positional[Path] = Path("out/recording")
+    """Folder with the recorded episodes."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.outputs import require_writable_file
+        from caldrive.driving.tables_seen import recording_table
+        from caldrive.perception.recordings import check_recording, draw_histograms
+
+        require_writable_file(self.picture, "--picture")
+        found, episodes = check_recording(self.folder, lambda share: progress("checking", share))
+        if episodes:
+            draw_histograms(episodes, found.counts, self.picture)
+        picture = self.picture if episodes else None
+        values = asdict(found) | {"picture": str(picture) if picture else None}
+        return Answer(values, recording_table(found, picture), int(bool(found.damaged)))
+
+
+@dataclass(frozen=True)
+class Evaluate(EvaluateSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.drivers import model_path
+        from caldrive.driving.outputs import require_writable_file
+        from caldrive.driving.tables_seen import evaluation_table
+        from caldrive.perception.checkpoint import load_network
+        from caldrive.perception.dataset import Frames, find_episodes, held_out
+        from caldrive.perception.report import PAPER, report
+
+        if self.worst is not None:
+            require_writable_file(self.worst, "--worst")
+        network, info = load_network(model_path(self.model))
+        episodes = find_episodes(self.data)
+        if self.held_out:
+            episodes = held_out(episodes, info.data)
+        frames = Frames(episodes, (network.config.image_height, network.config.image_width))
+        found = report(network, frames, self.worst, lambda share: progress("evaluating", share))
+        return Answer(asdict(found) | {"paper": PAPER}, evaluation_table(found))
+
+
+Speed = (
+    Annotated[WorldSpeed, subcommand("world", description="Camera steps a second, and where the time goes.")]
+    | Annotated[AgentSpeed, subcommand("agent", description="Milliseconds from image to control.")]
+)
+Command = (
+    Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
+    | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
+    | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
+    | Annotated[Data, subcommand("data", description="Check and describe a recording.")]
+    | Annotated[Evaluate, subcommand("evaluate", description="How well a network sees recorded frames.")]
+    | Annotated[Town, subcommand("town", description="Draw a town on one page.")]
+    | Annotated[Speed, subcommand("speed", description="Measure how fast the world or the agent is.")]
+    | Annotated[
+        Determinism, subcommand("determinism", description="Drive the same episode twice and compare all bytes.")
+    ]
+)
