@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import groupby
@@ -14,12 +16,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.datatypes import Control
+from caldrive.config import CollectConfig
+from caldrive.datatypes import Command, Control
 from caldrive.driving import collection
-from caldrive.driving.collection import BASELINES, CollectConfig, Disturbance, collect, episode_path, starting_place
-from caldrive.episodes import Episode, read_episode
+from caldrive.driving.collection import BASELINES, Disturbance, _record, collect, episode_path, starting_place
+from caldrive.episodes import Episode, EpisodeError, read_episode
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.route import random_route
+from caldrive.world.semantics import Semantic
 from caldrive.world.towns import load_town
 from caldrive.world.traffic import stop_sumo
 
@@ -182,10 +186,11 @@ controls = st.builds(
 
 @given(st.integers(0, 2**32), st.lists(st.tuples(controls, st.floats(0, 25)), min_size=1, max_size=60))
 def test_a_disturbance_is_bounded_and_ends(seed: int, drive: list[tuple[Control, float]]) -> None:
-    disturbance = Disturbance(np.random.default_rng(seed))
+    disturbance, before = Disturbance(np.random.default_rng(seed)), [0.0]
     for control, speed in drive:
         pushed = disturbance.apply(control, speed)  # a Control checks its own ranges
-        assert abs(pushed.steer - control.steer) <= 0.4 + 1e-9
+        before.append(control.steer)
+        assert abs(pushed.steer - control.steer) <= min(1.0, 36 / max(speed, 2.0) ** 2) + 1e-9 or pushed.steer in before
         assert abs((pushed.throttle - pushed.brake) - (control.throttle - control.brake)) <= 0.5 + 1e-9
 
 
@@ -197,7 +202,7 @@ def pushes(speed: float, seed: int = 0, steps: int = 20_000, control: Control | 
 def test_disturbances_are_short_and_leave_most_of_the_drive_alone() -> None:
     disturbed = [one != Control(throttle=0.4) for one in pushes(5.0)]
     assert 0.03 < np.mean(disturbed) < 0.3
-    assert max(len(list(run)) for pushed, run in groupby(disturbed) if pushed) < 14
+    assert max(len(list(run)) for pushed, run in groupby(disturbed) if pushed) < 19
 
 
 def test_a_slow_car_is_not_disturbed() -> None:
@@ -208,7 +213,7 @@ def test_the_push_at_the_wheel_goes_to_both_sides_and_weakens_with_speed() -> No
     slow, fast = (np.array([one.steer for one in pushes(speed)]) for speed in (5.0, 20.0))
     assert slow.max() > 0.25
     assert slow.min() < -0.25
-    assert np.abs(fast).max() <= 0.4 * 6 / 20 + 1e-9
+    assert np.abs(fast).max() <= (6 / 20) ** 2 + 1e-9
 
 
 def test_a_hard_braking_car_is_left_to_brake() -> None:
@@ -219,7 +224,8 @@ def test_starts_before_signs_lie_up_the_street_and_show_every_limit() -> None:
     roads, rng = load_town("town01"), np.random.default_rng(0)
     passed = set()
     for _ in range(60):
-        start = starting_place(roads, 1.0, rng)
+        start, turn = starting_place(roads, 1.0, 0.0, rng)
+        assert turn is None
         route = random_route(roads, start, 80.0, rng)
         near = [route.line.project(sign.pose.x, sign.pose.y) for sign in roads.signs]
         ahead = [(hit.s, sign.limit) for hit, sign in zip(near, roads.signs, strict=True) if -6 < hit.left < 0]
@@ -229,5 +235,67 @@ def test_starts_before_signs_lie_up_the_street_and_show_every_limit() -> None:
 
 def test_starts_are_anywhere_where_no_share_is_asked_for() -> None:
     roads, rng = load_town("town02"), np.random.default_rng(0)
-    lanes = {roads.lane_at(starting_place(roads, 0.0, rng))[0].id for _ in range(200)}
+    lanes = {roads.lane_at(starting_place(roads, 0.0, 0.0, rng)[0])[0].id for _ in range(200)}
     assert len(lanes) > 0.7 * sum(lane.line.length > 12 for lane in roads.driveable)
+
+
+def test_starts_before_turns_lie_up_the_street_and_show_every_command() -> None:
+    roads, rng = load_town("town01"), np.random.default_rng(0)
+    taken = []
+    for _ in range(60):
+        start, turn = starting_place(roads, 0.0, 1.0, rng)
+        assert turn is not None
+        route = random_route(roads, start, 80.0, rng, through=turn)
+        assert turn in [lane for lane, _ in route.lanes]
+        at = route.line.project(*roads.lanes[turn].line.points[0])
+        assert 0 < at.s < 60
+        taken.append(roads.lanes[turn].turn)
+    assert min(taken.count(command) for command in Command) > 10
+
+
+def test_a_wheel_that_stays_lets_the_car_turn_too_late() -> None:
+    disturbance, steers = Disturbance(np.random.default_rng(1)), []
+    for k in range(2000):
+        wanted = 0.0 if k % 20 < 10 else 0.5
+        steers.append((wanted, disturbance.apply(Control(throttle=0.4, steer=wanted), 5.0).steer))
+    assert (0.5, 0.0) in steers
+    assert (0.0, 0.5) in steers
+
+
+def test_semantic_images_are_recorded_where_they_are_asked_for(unbroken: Path, tmp_path: Path) -> None:
+    asked = replace(TINY, episodes=1, semantic=True)
+    list(collect(asked, tmp_path))
+    plain, found = (read_episode(episode_path(folder, 0), semantic=True) for folder in (unbroken, tmp_path))
+    assert found.semantic(5).shape == found.image(5).shape[:2]
+    assert Semantic.ROAD in found.semantic(5)
+    assert found.jpegs == plain.jpegs
+    assert read_episode(episode_path(tmp_path, 0)).semantics is None
+    with pytest.raises(EpisodeError, match="record with --semantic"):
+        plain.semantic(5)
+
+
+def _dies_once(config: CollectConfig, number: int, folder: Path) -> int:
+    mark = folder / "died"
+    if number == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return _record(config, number, folder)
+
+
+def _dies(config: CollectConfig, number: int, folder: Path) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return 0
+
+
+def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(collection, "_record", _dies_once)
+    list(collect(TINY, tmp_path, workers=2))
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_workers_that_always_die_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(collection, "_record", _dies)
+    with pytest.raises(RuntimeError, match="type --workers 1"):
+        list(collect(TINY, tmp_path, workers=2))

@@ -108,14 +108,22 @@ class Determinism(DeterminismSettings, Output):
 @dataclass(frozen=True)
 class Collect(CollectSettings, Output):
     def run(self, progress: Progress) -> Answer:
-        from caldrive.driving.collection import CollectConfig, collect
+        from caldrive.config import CollectConfig
+        from caldrive.driving.collection import collect
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.driving.tables import counts_table
         from caldrive.perception.dataset import class_counts, find_episodes
 
         require_writable_folder(self.out)
         config = CollectConfig(
-            self.town, self.weathers, self.episodes, self.duration, width=self.width, height=self.height, seed=self.seed
+            self.town,
+            self.weathers,
+            self.episodes,
+            self.duration,
+            width=self.width,
+            height=self.height,
+            semantic=self.semantic,
+            seed=self.seed,
         )
         for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
             progress(f"recording, {done} done", done / self.episodes)

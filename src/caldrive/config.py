@@ -109,6 +109,29 @@ class ControlConfig:
 
 
 @dataclass(frozen=True)
+class CollectConfig:
+    """What to record. duration: s of an episode. crossing: how much more people cross than usual.
+    before_signs, before_turns: shares of all episodes that begin before a sign, and before a turn at a junction.
+    hidden_cars: share of all episodes whose driver is told of no car ahead. semantic: a semantic image of each frame.
+    """
+
+    town: str = "town01"
+    weathers: tuple[int, ...] = (1, 3, 6, 8)
+    episodes: int = 340
+    duration: float = 30.0
+    cars: int = 40
+    people: int = 70
+    crossing: float = 3.0
+    before_signs: float = 0.4
+    before_turns: float = 0.4
+    hidden_cars: float = 0.1
+    width: int = 200
+    height: int = 88
+    semantic: bool = False
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class BlockConfig:
     """A task block: kind of layer (dense, lstm, gru or tconv), its nodes (for each command where the affordance is
     conditional), dropout ratio, length of its sequence in frames, dilation (2: every other frame), batch norm.
@@ -138,10 +161,10 @@ class PerceptionConfig:
     image_height: int = 88
     width: float = 0.25
     batch_norm: bool = True
-    hazard_stop: BlockConfig = BlockConfig("tconv", 64, 0.25, length=3)
+    hazard_stop: BlockConfig = BlockConfig("dense", 64, 0.25)
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
-    vehicle_distance: BlockConfig = BlockConfig("tconv", 64, 0.1, length=3)
+    vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
     relative_angle: BlockConfig = BlockConfig("dense", 64, 0.0, norm=False)
     center_distance: BlockConfig = BlockConfig("dense", 64, 0.0, norm=False)
 
@@ -173,8 +196,8 @@ class TrainingConfig:
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu or cuda.
     """
 
-    steps: int = 5000
-    batch: int = 32
+    steps: int = 8000
+    batch: int = 96
     window: int = 1
     learning_rate: float = 1e-3
     warm_up: int = 100
@@ -194,5 +217,5 @@ class TrainingConfig:
 TRAININGS = {
     "small": TrainingConfig(),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
-    "paper": TrainingConfig(steps=75_000, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0),
+    "paper": TrainingConfig(steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0),
 }

@@ -1,7 +1,7 @@
 """A recorded episode on disk, the only home of the format: one Parquet file, one row for each frame of each camera.
 
-Images are JPEG bytes. The scenario, the episode's id and the version of the format lie as JSON in the schema's
-metadata.
+Images are JPEG bytes; a semantic image, where one was asked for, is a byte a pixel. The scenario, the episode's id and
+the version of the format lie as JSON in the schema's metadata.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ SCHEMA = pa.schema(
         ("image", pa.binary()),
     ]
 )
+SEMANTIC = pa.field("semantic", pa.binary())  # only in recordings that were asked for it
 
 
 class EpisodeError(ValueError):
@@ -54,7 +55,7 @@ class Frame:
 
     index: number of the moment, from 0. camera: its id, with its lateral offset (m, + left) and yaw (rad, + left).
     affordances: the labels as of a car that stands where the camera looks from. driven: the control that moved the car,
-    clean: what the driver wanted before any noise was added.
+    clean: what the driver wanted before any noise was added. semantic (H, W): the class of each pixel, by number.
     """
 
     index: int
@@ -68,6 +69,7 @@ class Frame:
     camera: int = 0
     camera_left: float = 0.0
     camera_yaw: float = 0.0
+    semantic: NDArray[np.uint8] | None = None
 
 
 def scenario_to_json(scenario: Scenario) -> str:
@@ -93,6 +95,8 @@ def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
     # 4:4:4 keeps the colour of lamps that are a pixel or two wide.
     jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
     named = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
+    if frame.semantic is not None:
+        named[SEMANTIC.name] = frame.semantic.tobytes()
     return named | plain | labels | driven | clean
 
 
@@ -117,8 +121,9 @@ class EpisodeWriter:
         if not self._rows:
             raise EpisodeError(f"{self.path} would be an episode without frames: append at least one before closing it")
         header = {"version": FORMAT_VERSION, "id": self.id, "scenario": scenario_to_json(self.scenario)}
-        schema = SCHEMA.with_metadata({METADATA_KEY: json.dumps(header).encode()})
-        columns = [name for name in SCHEMA.names if name != "image"]
+        schema = SCHEMA.append(SEMANTIC) if SEMANTIC.name in self._rows[0] else SCHEMA
+        schema = schema.with_metadata({METADATA_KEY: json.dumps(header).encode()})
+        columns = [name for name in schema.names if name != "image"]
         buffer = io.BytesIO()
         pq.write_table(
             pa.Table.from_pylist(self._rows, schema=schema),
@@ -144,7 +149,7 @@ class Episode:
 
     columns: episode, frame, camera, camera_left, camera_yaw, time, speed, command (the values of `Command`), the six
     labels (speed_sign is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera, then by
-    frame.
+    frame. semantics: a byte a pixel for each row, where they were recorded and asked for.
     """
 
     path: Path
@@ -152,6 +157,7 @@ class Episode:
     scenario: Scenario
     columns: dict[str, NDArray[Any]]
     jpegs: list[bytes]
+    semantics: list[bytes] | None = None
 
     def __len__(self) -> int:
         return len(self.jpegs)
@@ -169,6 +175,14 @@ class Episode:
             raise EpisodeError(
                 f"row {i} of {self.path} holds a damaged image: remove the file and record again"
             ) from error
+
+    def semantic(self, i: int) -> NDArray[np.uint8]:
+        """Row i's semantic image (H, W). Raises EpisodeError where there is none that fits its image."""
+        shape = self.image(i).shape[:2]
+        found = self.semantics[i] if self.semantics is not None else b""
+        if len(found) != shape[0] * shape[1]:
+            raise EpisodeError(f"row {i} of {self.path} has no semantic image of {shape}: record with --semantic")
+        return np.frombuffer(found, np.uint8).reshape(shape)
 
     def affordances(self, i: int) -> Affordances:
         """Row i's labels."""
@@ -193,6 +207,7 @@ class Episode:
             value["camera"],
             value["camera_left"],
             value["camera_yaw"],
+            self.semantic(i) if self.semantics is not None else None,
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -213,19 +228,25 @@ def _header(path: Path, schema: pa.Schema) -> dict[str, Any]:
     return header
 
 
-def read_episode(path: Path | str) -> Episode:
-    """Read a recording. Raises EpisodeError where the file is missing, damaged or of another kind."""
+def read_episode(path: Path | str, semantic: bool = False) -> Episode:
+    """Read a recording; semantic: with the semantic images, if it has them.
+
+    Raises EpisodeError where the file is missing, damaged or of another kind.
+    """
     path = Path(path)
     if not path.is_file():
         raise EpisodeError(f"there is no episode {path}: look for the name, or record one with `caldrive collect`")
     try:
-        table = pq.read_table(path, memory_map=False, partitioning=None)
+        names = pq.read_schema(path).names
+        names = [name for name in names if semantic or name != SEMANTIC.name]
+        table = pq.read_table(path, columns=names, memory_map=False, partitioning=None)
         header = _header(path, table.schema)
         scenario = scenario_from_json(header["scenario"])
         table = table.sort_by([("camera", "ascending"), ("frame", "ascending")])
         columns = {name: table[name].to_numpy() for name in SCHEMA.names if name != "image"}
         _check_values(path, table, columns)
-        return Episode(path, str(header["id"]), scenario, columns, table["image"].to_pylist())
+        semantics = table[SEMANTIC.name].to_pylist() if SEMANTIC.name in names else None
+        return Episode(path, str(header["id"]), scenario, columns, table["image"].to_pylist(), semantics)
     except EpisodeError:
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:

@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from caldrive.config import CameraConfig, ControlConfig
+from caldrive.config import CameraConfig, CollectConfig, ControlConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Pose, Scenario
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Command, Control, Observation, Pose, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
 from caldrive.files import write_whole
@@ -29,52 +30,40 @@ from caldrive.world.route import random_route
 from caldrive.world.towns import load_town
 from caldrive.world.weather import weather
 
+T = TypeVar("T")
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
+MOST_DEATHS = 3  # of workers in a row
 MAX_YAW = math.radians(15)
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
 
 
-@dataclass(frozen=True)
-class CollectConfig:
-    """What to record. duration: s of an episode. crossing: how much more people cross than usual.
-    before_signs: share of all episodes that begin before a sign. hidden_cars: share of all episodes whose driver is
-    told of no car ahead.
-    """
-
-    town: str = "town01"
-    weathers: tuple[int, ...] = (1, 3, 6, 8)
-    episodes: int = 240
-    duration: float = 40.0
-    cars: int = 20
-    people: int = 70
-    crossing: float = 3.0
-    before_signs: float = 0.5
-    hidden_cars: float = 0.1
-    width: int = 200
-    height: int = 88
-    seed: int = 0
-
-
 class Disturbance:
-    """Short pushes at wheel and pedals, so that recoveries are seen: triangular pulses at random times."""
+    """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
+    that stays as it is, which lets the car turn in too late or keep turning for too long."""
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self.rng, self.left, self.length, self.steer, self.pedal = rng, 0, 1, 0.0, 0.0
+        self.rng, self.left, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
 
     def apply(self, control: Control, speed: float) -> Control:
-        """The disturbed control. The faster the car, the weaker the push at the wheel."""
+        """The disturbed control. The faster the car, the weaker the push: its sideways acceleration is what counts."""
         if self.left == 0:
-            if speed > 2.0 and self.rng.random() < 0.015:
-                self.left = self.length = int(self.rng.integers(6, 14))
-                self.steer = float(self.rng.uniform(-0.4, 0.4)) * min(1.0, 6.0 / speed)
-                self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
+            if speed > 2.0 and self.rng.random() < 0.035:
+                self._begin(control, speed)
             return control
-        push = 1 - abs(2 * self.left / self.length - 1)
+        share = 1 - abs(2 * self.left / self.length - 1)
         self.left -= 1
-        effort = control.throttle - control.brake + push * self.pedal * (control.brake < 0.3)
-        steer = float(np.clip(control.steer + push * self.steer, -1, 1))
-        return Control(float(np.clip(effort, 0, 1)), float(np.clip(-effort, 0, 1)), steer)
+        effort = control.throttle - control.brake + share * self.pedal * (control.brake < 0.3)
+        steer = control.steer + share * self.push if self.push else self.wheel
+        return Control(*(float(np.clip(x, low, 1)) for x, low in ((effort, 0), (-effort, 0), (steer, -1))))
+
+    def _begin(self, control: Control, speed: float) -> None:
+        self.left = self.length = int(self.rng.integers(6, 19))
+        self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
+        self.wheel, self.push = control.steer, 0.0
+        if self.rng.random() < 0.6:
+            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2)
+            self.push = float(self.rng.choice([-1, 1]) * strength)
 
 
 class _HiddenCars(OraclePerception):
@@ -105,29 +94,43 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
         for index, observation in enumerate(_moments(world, config)):
             clean = agent.act(observation)
             driven = disturbance.apply(clean, observation.speed)
-            for camera, (mount, image) in enumerate(zip(mounts, world.images(mounts), strict=True)):
+            semantics = world.semantic_images(mounts) if config.semantic else [None] * len(mounts)
+            seen = zip(mounts, world.images(mounts), semantics, strict=True)
+            for camera, (mount, image, semantic) in enumerate(seen):
                 labels = world.labels_at(mount.left, mount.yaw)
                 writer.append(
                     Frame(index, observation.time, observation.speed, observation.command, labels, driven, clean,
-                          image, camera, mount.left, mount.yaw)
+                          image, camera, mount.left, mount.yaw, semantic)
                 )  # fmt: skip
             frames += len(mounts)
             world.step(driven)
     return frames
 
 
-def starting_place(roads: RoadNetwork, before_signs: float, rng: np.random.Generator) -> Pose:
-    """Anywhere on the roads, or in a share of the cases some way before a sign; each limit gets as many of these."""
-    lanes = [lane for lane in roads.driveable if lane.line.length > 12]
-    lane = lanes[int(rng.integers(len(lanes)))]
-    s = float(rng.uniform(3, lane.line.length - 3))
+def starting_place(
+    roads: RoadNetwork, before_signs: float, before_turns: float, rng: np.random.Generator
+) -> tuple[Pose, str | None]:
+    """Anywhere on the roads, or in a share of the cases some way before a sign or a turn at a junction; each limit and
+    each command gets as many of these. Returns the place, and the lane of that turn if any."""
+    chance = rng.random()
     limits = sorted({sign.limit for sign in roads.signs})
-    if limits and rng.random() < before_signs:
-        limit = limits[int(rng.integers(len(limits)))]
-        signs = [sign for sign in roads.signs if sign.limit == limit]
-        lane, at = roads.lane_at(signs[int(rng.integers(len(signs)))].pose)
-        return _upstream(roads, lane, at - float(rng.uniform(15, 60)))
-    return lane.line.pose_at(s)
+    if limits and chance < before_signs:
+        limit = _one_of(limits, rng)
+        sign = _one_of([sign for sign in roads.signs if sign.limit == limit], rng)
+        lane, at = roads.lane_at(sign.pose)
+        return _upstream(roads, lane, at - float(rng.uniform(15, 60))), None
+    turns = [lane for lane in roads.lanes.values() if lane.turn is not None]
+    commands = [command for command in Command if any(lane.turn is command for lane in turns)]
+    if commands and before_signs <= chance < before_signs + before_turns:
+        command = _one_of(commands, rng)
+        turn = _one_of([lane for lane in turns if lane.turn is command], rng)
+        return _upstream(roads, turn, -float(rng.uniform(5, 40))), turn.id
+    lane = _one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
+    return lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3))), None
+
+
+def _one_of(things: Sequence[T], rng: np.random.Generator) -> T:
+    return things[int(rng.integers(len(things)))]
 
 
 def _upstream(roads: RoadNetwork, lane: Lane, s: float) -> Pose:
@@ -143,8 +146,8 @@ def _set_up(
 ) -> tuple[Scenario, CALAgent]:
     """A random start and random turns; returns the scenario and the driver."""
     roads = world.enter(config.town)
-    start = starting_place(roads, config.before_signs, rng)
-    route = random_route(roads, start, config.duration * 14 + 50, rng)
+    start, turn = starting_place(roads, config.before_signs, config.before_turns, rng)
+    route = random_route(roads, start, config.duration * 14 + 50, rng, turn)
     under = config.weathers[number % len(config.weathers)]
     seed = int(rng.integers(2**31))
     scenario = Scenario(
@@ -226,14 +229,30 @@ def _claim(folder: Path, config: CollectConfig) -> None:
 def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[tuple[int, int]]:
     """Records what is missing in a folder; yields (episode, frames) as they are done.
 
-    Raises ValueError where the folder holds a recording with other settings.
+    Where a worker dies, new ones go on. Raises ValueError where the folder holds a recording with other settings,
+    RuntimeError where workers die again and again.
     """
     _check(config, workers)
     _claim(folder, config)
-    missing = [k for k in range(config.episodes) if not episode_path(folder, k).exists()]
     if workers == 1:
-        yield from ((k, _record(config, k, folder)) for k in missing)
+        yield from ((k, _record(config, k, folder)) for k in _missing(config, folder))
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = [(k, pool.submit(_record, config, k, folder)) for k in missing]
-        yield from ((k, job.result()) for k, job in jobs)
+    deaths = 0
+    while missing := _missing(config, folder):
+        done = False
+        try:
+            with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+                jobs = [(k, pool.submit(_record, config, k, folder)) for k in missing]
+                for k, job in jobs:
+                    yield k, job.result()
+                    done = True
+        except BrokenProcessPool as error:
+            deaths = 0 if done else deaths + 1
+            if deaths == MOST_DEATHS:
+                raise RuntimeError(
+                    f"found that recording workers die, {deaths} times in a row: type --workers 1 to see why"
+                ) from error
+
+
+def _missing(config: CollectConfig, folder: Path) -> list[int]:
+    return [k for k in range(config.episodes) if not episode_path(folder, k).exists()]

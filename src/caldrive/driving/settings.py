@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from caldrive.config import CollectConfig
+
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
 
 
@@ -101,18 +103,20 @@ class CollectSettings:
 
     out: Path = Path("out/recording")
     """Folder for the episodes."""
-    town: str = "town01"
+    town: str = CollectConfig.town
     """town01 for training; town02 is for evaluation only."""
-    weathers: tuple[int, ...] = (1, 3, 6, 8)
+    weathers: tuple[int, ...] = CollectConfig.weathers
     """The weathers, in turn."""
-    episodes: int = 240
+    episodes: int = CollectConfig.episodes
     """How many episodes the folder holds in the end."""
-    duration: float = 40.0
+    duration: float = CollectConfig.duration
     """Simulated seconds of each."""
-    width: int = 200
+    width: int = CollectConfig.width
     """Width of the images in pixels; the preset paper takes 320."""
-    height: int = 88
+    height: int = CollectConfig.height
     """Height of the images in pixels; the preset paper takes 144."""
+    semantic: bool = False
+    """Also record what each pixel shows: a number of world/semantics.py for each."""
     workers: int = 2
     """Processes that record at the same time."""
     seed: int = 0

@@ -17,12 +17,19 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from caldrive.datatypes import Command
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Command
 from caldrive.episodes import LABELS, Episode, EpisodeError, read_episode
 from caldrive.perception.specs import SPECS, encode_columns
 
 Ids = NDArray[np.int64]
 COMMAND_NUMBERS = {command.value: number for number, command in enumerate(Command)}
+# Edges of the classes in which the size of a continuous column is balanced.
+SIZES = {
+    "vehicle_distance": (10.0, 25.0, MAX_VEHICLE_DISTANCE),
+    "center_distance": (0.4, 0.8, 1.2),
+    "clean_steer": (0.05, 0.15, 0.4),
+}
+STANDING = 0.25  # weight of a frame in which the car stands: it looks like the one before
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,11 @@ class Frames:
         words = np.concatenate([e.columns["command"] for e in episodes])
         self.command = np.array([COMMAND_NUMBERS[word] for word in words], dtype=np.int64)
         self.targets = encode_columns(self.labels)
+        self._sizes = [
+            np.digitize(np.abs(np.concatenate([e.columns[name] for e in episodes])), edges)
+            for name, edges in SIZES.items()
+        ]
+        self._standing = np.concatenate([e.columns["speed"] for e in episodes]) < 0.1
         self.stream_start = self._stream_starts(episodes)
         lengths = [len(e) for e in episodes]
         self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
@@ -171,11 +183,12 @@ class Frames:
         return np.flatnonzero(inside)
 
     def rarity(self, balance: float) -> NDArray[np.float64]:
-        """For each frame (N,): (1 / frequency) ** balance of the rarest of its classes and its command."""
-        numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self.command]
+        """For each frame (N,): (1 / frequency) ** balance of its rarest class; of classes are the discrete affordances,
+        the command, and the sizes of what is continuous."""
+        numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self.command, *self._sizes]
         frequencies = [(np.bincount(number) / len(self))[number] for number in numbers]
         rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
-        return (1 / rarest) ** balance
+        return (1 / rarest) ** balance * np.where(self._standing, STANDING**balance, 1.0)
 
 
 class Sampler:

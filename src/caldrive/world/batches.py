@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -10,42 +11,55 @@ import numpy as np
 from caldrive.world.actors import INSTANCE, Instances
 from caldrive.world.buildings import building_meshes
 from caldrive.world.furniture import furniture_meshes
-from caldrive.world.gl import gl_context, programs
+from caldrive.world.gl import Programs, SemanticPrograms, gl_context, programs, semantic_programs
 from caldrive.world.ground import KERB_HEIGHT, far_kerb_mesh, kerb_mesh, road_mesh, yard_mesh
 from caldrive.world.meshes import Mesh, Triangles
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import Prop
+from caldrive.world.semantics import Semantic, classed, classed_detail
 from caldrive.world.tiles import Level, Tiles
 
-_FORMAT = {"position": "3f", "uv": "3f", "normal": "4f1", "color": "4f1"}
-_SKIPPED = {"position": "3x4", "uv": "3x4", "normal": "4x1", "color": "4x1"}
-_PER_INSTANCE = ("4f 4f 4f1 4f1 4f1 4f1/i", "placed", "scale", "first", "second", "third", "fourth")
+# Attributes with their format, and the padding where a program has no use for them.
+_VERTEX = {"position": ("3f", "3x4"), "uv": ("3f", "3x4"), "normal": ("4f1", "4x1"), "color": ("4f1", "4x1")}
+_INSTANCE = {
+    "placed": ("4f", "4x4"), "scale": ("4f", "4x4"),
+    "first": ("4f1", "4x1"), "second": ("4f1", "4x1"), "third": ("4f1", "4x1"), "fourth": ("4f1", "4x1"),
+}  # fmt: skip
 
 
 def vertex_array(
-    program: moderngl.Program, data: moderngl.Buffer, wanted: tuple[str, ...], index: moderngl.Buffer,
-    instances: moderngl.Buffer | None = None,
-) -> moderngl.VertexArray:  # fmt: skip
-    layout = " ".join(_FORMAT[name] if name in wanted else _SKIPPED[name] for name in _FORMAT)
-    content: list[tuple[object, ...]] = [(data, layout, *(name for name in _FORMAT if name in wanted))]
-    if instances is not None:
-        content.append((instances, *_PER_INSTANCE))
-    return gl_context().vertex_array(program, content, index_buffer=index, index_element_size=4)
+    program: moderngl.Program, data: moderngl.Buffer, index: moderngl.Buffer, instances: moderngl.Buffer | None = None
+) -> moderngl.VertexArray:
+    """Triangles for a program, which takes of the vertices and instances what it has a use for."""
+
+    def content(buffer: moderngl.Buffer, table: dict[str, tuple[str, str]], each: str = "") -> tuple[object, ...]:
+        layout = " ".join(used if name in program else skipped for name, (used, skipped) in table.items())
+        return (buffer, layout + each, *(name for name in table if name in program))
+
+    both = [content(data, _VERTEX)] + ([] if instances is None else [content(instances, _INSTANCE, "/i")])
+    return gl_context().vertex_array(program, both, index_buffer=index, index_element_size=4)
 
 
 class TownBatch:
-    """A town's mesh, whose triangles are chosen anew for each picture."""
+    """A town's mesh, whose triangles are chosen anew for each picture. kind: the name of its programs."""
 
-    def __init__(self, tiles: Tiles, program: moderngl.Program, layout: tuple[str, ...]) -> None:
+    def __init__(self, tiles: Tiles, kind: str) -> None:
         gl = gl_context()
-        self.tiles = tiles
+        self.tiles, self.kind = tiles, kind
         self.index = gl.buffer(reserve=max(4, tiles.faces.triangles.nbytes), dynamic=True)
         self.data = gl.buffer(np.ascontiguousarray(tiles.vertices).tobytes())
-        self.array = vertex_array(program, self.data, layout, self.index)
+        self.array = self._array(programs())
 
-    def draw(self, triangles: Triangles) -> None:
+    def _array(self, made: Programs | SemanticPrograms) -> moderngl.VertexArray:
+        return vertex_array(getattr(made, self.kind), self.data, self.index)
+
+    @cached_property
+    def semantic(self) -> moderngl.VertexArray:
+        return self._array(semantic_programs())
+
+    def draw(self, triangles: Triangles, semantic: bool = False) -> None:
         self.index.write(triangles)
-        self.array.render(vertices=triangles.size)
+        (self.semantic if semantic else self.array).render(vertices=triangles.size)
 
 
 class Crowd:
@@ -55,28 +69,33 @@ class Crowd:
         gl = gl_context()
         self.most = most
         self.buffer = gl.buffer(reserve=most * INSTANCE.itemsize, dynamic=True)
-        data, index = gl.buffer(mesh.vertices.tobytes()), gl.buffer(mesh.triangles.tobytes())
-        self.array = vertex_array(programs().actor, data, ("position", "normal", "color"), index, self.buffer)
+        self.data, self.index = gl.buffer(mesh.vertices.tobytes()), gl.buffer(mesh.triangles.tobytes())
+        self.array = self._array(programs())
 
-    def draw(self, instances: Instances) -> None:
+    def _array(self, made: Programs | SemanticPrograms) -> moderngl.VertexArray:
+        return vertex_array(made.actor, self.data, self.index, self.buffer)
+
+    @cached_property
+    def semantic(self) -> moderngl.VertexArray:
+        return self._array(semantic_programs())
+
+    def draw(self, instances: Instances, semantic: bool = False) -> None:
         n = min(len(instances), self.most)
         if n:
             self.buffer.write(np.ascontiguousarray(instances[:n]))
-            self.array.render(instances=n)
+            (self.semantic if semantic else self.array).render(instances=n)
 
 
 def town_batches(roads: RoadNetwork, scenery: Sequence[Prop]) -> tuple[TownBatch, TownBatch]:
     """A town's asphalt, and everything else that stands still."""
-    houses = building_meshes(scenery, roads.style)
+    houses = classed_detail(building_meshes(scenery, roads.style), Semantic.BUILDING)
     furniture = furniture_meshes(scenery, roads.style, KERB_HEIGHT)
     asphalt = Tiles([(road_mesh(roads), Level.ALWAYS)])
     standing = Tiles([
         (houses.always, Level.ALWAYS), (houses.near, Level.NEAR), (houses.far, Level.FAR),
         (furniture.always, Level.ALWAYS), (furniture.near, Level.NEAR), (furniture.far, Level.FAR),
-        (kerb_mesh(roads), Level.NEAR), (far_kerb_mesh(roads), Level.ALWAYS), (yard_mesh(roads), Level.ALWAYS),
+        (classed(kerb_mesh(roads), Semantic.SIDEWALK), Level.NEAR),
+        (classed(far_kerb_mesh(roads), Semantic.SIDEWALK), Level.ALWAYS),
+        (classed(yard_mesh(roads), Semantic.GROUND), Level.ALWAYS),
     ])  # fmt: skip
-    made = programs()
-    return (
-        TownBatch(asphalt, made.road, ("position", "uv", "color")),
-        TownBatch(standing, made.static, ("position", "uv", "normal", "color")),
-    )
+    return TownBatch(asphalt, "road"), TownBatch(standing, "static")

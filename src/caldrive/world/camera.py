@@ -6,19 +6,21 @@ from collections.abc import Mapping, Sequence
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.world.actors import Actors, car_actors, person_actors
-from caldrive.world.atmosphere import Atmosphere
+from caldrive.world.atmosphere import PAINT, Atmosphere
 from caldrive.world.batches import Crowd, TownBatch, town_batches, vertex_array
 from caldrive.world.cars import SHAPES, car_mesh, far_car_mesh
-from caldrive.world.gl import Target, gl_context, programs
+from caldrive.world.gl import Target, gl_context, programs, semantic_programs
 from caldrive.world.optics import Lens, mounted
 from caldrive.world.overlays import Overlays
 from caldrive.world.people import far_person_mesh, person_mesh
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import Prop
+from caldrive.world.semantics import Semantic
 from caldrive.world.sight import Cells, Sight
 from caldrive.world.sky import dome_mesh
 from caldrive.world.tiles import DETAIL, Place, View
@@ -40,10 +42,10 @@ class Camera:
         self._cars = [Crowd(make(shape)) for shape in SHAPES for make in (car_mesh, far_car_mesh)]
         self._people = [Crowd(person_mesh()), Crowd(far_person_mesh())]
         data, index = gl.buffer(dome.vertices.tobytes()), gl.buffer(dome.triangles.tobytes())
-        self._dome = vertex_array(made.sky, data, ("position", "uv"), index)
+        self._dome = vertex_array(made.sky, data, index)
         self._atmosphere, self._overlays = Atmosphere(roads, scenery), Overlays(roads.posts)
         self._sight = Sight(scenery)
-        self._targets: dict[tuple[int, int], Target] = {}
+        self._targets: dict[tuple[tuple[int, int], int], Target] = {}
 
     def render(
         self, weather: int, ego: VehicleState, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState],
@@ -75,10 +77,10 @@ class Camera:
         thrown = np.concatenate((cars.shadows, people.shadows))
         images = []
         for lens in lenses:
-            target, view = self._open(lens, time), lens.view()
-            self._draw_actors(view, lens, cars, self._cars, CAR_DETAIL, CAR_FAR)
-            self._draw_actors(view, lens, people, self._people, PERSON_DETAIL, PERSON_FAR)
-            self._draw_town(view, lens)
+            target, view = self._open(lens, self.samples, time), lens.view()
+            self._draw_solid(view, lens, cars, people)
+            gl_context().disable(moderngl.CULL_FACE)
+            self._dome.render()
             self._overlays.shadows(view, thrown)
             self._overlays.lamps(view, lit, sky.wetness > 0)
             if sky.rain > 0:
@@ -86,11 +88,27 @@ class Camera:
             images.append(target.read())
         return images
 
-    def _open(self, lens: Lens, time: float) -> Target:
+    def render_semantics(
+        self, ego: VehicleState, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState],
+        mounts: Sequence[CameraConfig],
+    ) -> list[NDArray[np.uint8]]:  # fmt: skip
+        """What each pixel of `render`'s pictures shows, (H, W) for each mount, as numbers of `Semantic`."""
+        made = semantic_programs()
+        made.road["widths"] = PAINT[self._atmosphere.roads.style][-1]
+        cars, people = car_actors(vehicles), person_actors(pedestrians)
+        images = []
+        for lens in (mounted(ego, mount) for mount in mounts):
+            target = self._open(lens, 0, 0.0)
+            target.drawn.clear()  # sky is where nothing is drawn
+            self._draw_solid(lens.view(), lens, cars, people, semantic=True)
+            images.append(target.read()[..., 0])
+        return images
+
+    def _open(self, lens: Lens, samples: int, time: float) -> Target:
         """An empty target that is drawn into from now on."""
-        if lens.size not in self._targets:
-            self._targets[lens.size] = Target(lens.size, self.samples)
-        target, gl, made = self._targets[lens.size], gl_context(), programs()
+        if (lens.size, samples) not in self._targets:
+            self._targets[lens.size, samples] = Target(lens.size, samples)
+        target, gl, made = self._targets[lens.size, samples], gl_context(), programs()
         target.drawn.use()
         gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         gl.front_face, gl.depth_func = "cw", "<="  # pictures are drawn upside down
@@ -101,19 +119,30 @@ class Camera:
         made.frame.bind_to_uniform_block(0)
         return target
 
+    def _draw_solid(self, view: View, lens: Lens, cars: Actors, people: Actors, semantic: bool = False) -> None:
+        """Everything but the sky and what lies over it."""
+        if semantic:
+            semantic_programs().actor["kind"] = Semantic.VEHICLE
+        self._draw_actors(view, lens, cars, self._cars, (CAR_DETAIL, CAR_FAR), semantic)
+        if semantic:
+            semantic_programs().actor["kind"] = Semantic.PERSON
+        self._draw_actors(view, lens, people, self._people, (PERSON_DETAIL, PERSON_FAR), semantic)
+        self._draw_town(view, lens, semantic)
+
     def _draw_actors(
-        self, view: View, lens: Lens, group: Actors, crowds: Sequence[Crowd], detail: float, far: float
+        self, view: View, lens: Lens, group: Actors, crowds: Sequence[Crowd], reach: tuple[float, float], semantic: bool
     ) -> None:
-        """Cars or people; crowds: for each shape its fine and its coarse mesh."""
+        """Cars or people; crowds: for each shape its fine and its coarse mesh. reach: m of fine meshes, and of all."""
         sharp = max(1.0, lens.focal / SHARP)
+        detail, far = reach
         distance = np.hypot(*(group.at - view.eye[:2]).T)
         seen = view.sees(group.at, 3.0) & (distance < far * sharp)
         kind = 2 * group.shapes + (distance > detail * sharp)
         for k in sorted(set(kind[seen].tolist())):
-            crowds[k].draw(group.instances[seen & (kind == k)])
+            crowds[k].draw(group.instances[seen & (kind == k)], semantic)
 
-    def _draw_town(self, view: View, lens: Lens) -> None:
-        """Road and scenery as far as they can be seen from here, then the sky."""
+    def _draw_town(self, view: View, lens: Lens, semantic: bool) -> None:
+        """Road and scenery as far as they can be seen from here."""
         place = Place.around(view.eye, PLACE, DETAIL * max(1.0, lens.focal / SHARP))
         above = place.low[2] >= PLACE
         low = np.array(place.low[:2])
@@ -122,9 +151,7 @@ class Camera:
             return None if above else self._sight.seen_from(low, low + PLACE, TOWN_FAR)
 
         for batch in self._batches:
-            batch.draw(batch.tiles.visible(view, place, seen, 2 * TOWN_FAR if above else TOWN_FAR))
-        gl_context().disable(moderngl.CULL_FACE)
-        self._dome.render()
+            batch.draw(batch.tiles.visible(view, place, seen, 2 * TOWN_FAR if above else TOWN_FAR), semantic)
 
     def close(self) -> None:
         """Frees what the town holds on the graphics side."""

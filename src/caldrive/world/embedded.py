@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from caldrive.config import CameraConfig, VehicleConfig
 from caldrive.datatypes import (
@@ -119,6 +120,12 @@ class EmbeddedWorld:
         return self._camera.render(
             self.scenario.weather, self.ego, self.vehicles, self.people, states, mounts, self.time
         )
+
+    def semantic_images(self, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
+        """What each pixel of `images` shows, (H, W) each, as numbers of `semantics.Semantic`."""
+        if self._camera is None:
+            self._camera = Camera(self.roads, self.scenery)
+        return self._camera.render_semantics(self.ego, self.vehicles, self.people, mounts)
 
     def labels_at(self, left: float, yaw: float) -> Affordances:
         """The affordances of a car that stands `left` m beside the ego, turned by `yaw` (the three-camera set-up)."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from caldrive.world.meshes import RGB, Detail, Mesh, box, disc, lathe, merge, packed, quads, smooth
 from caldrive.world.scenery import Prop
+from caldrive.world.semantics import PROP_CLASSES, Semantic, classed_detail
 from caldrive.world.textures import SIGN_LAYERS, Tex
 
 LAMPS = {"red": 3.16, "yellow": 2.82, "green": 2.48}  # m above the ground
@@ -41,7 +42,9 @@ def _sign_post(limit: int) -> Detail:
         merge(
             (
                 _pole(2.1, 0.045, n=sides),
-                disc((-0.07, 0, SIGN_HEIGHT), SIGN_RADIUS, n, (255, 255, 255), -1, SIGN_LAYERS[limit], slot=1),
+                disc(
+                    (-0.07, 0, SIGN_HEIGHT), SIGN_RADIUS, n, (255, 255, 255), -1, SIGN_LAYERS[limit], slot=Semantic.SIGN
+                ),
             )
         )
         for sides, n in ((4, 16), (3, 8))
@@ -175,7 +178,7 @@ def furniture_meshes(props: Sequence[Prop], style: str, foot: float) -> Detail:
             groups[prop.kind, prop.variant, prop.label].append(prop)
     always, near, far = list[Mesh](), list[Mesh](), list[Mesh]()
     for (kind, variant, label), members in groups.items():
-        detail = _template(kind, variant, label, style)
+        detail = classed_detail(_template(kind, variant, label, style), PROP_CLASSES.get(kind, Semantic.FURNITURE))
         scales = [p.height / TREE_HEIGHT if kind == "tree" else 1.0 for p in members]
         for found, mesh in ((always, detail.always), (near, detail.near), (far, detail.far)):
             if len(mesh.triangles):

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.world import effects, shaders
+from caldrive.world import effects, semantics, shaders
 from caldrive.world.textures import texture_layers
 
 
@@ -32,27 +32,44 @@ class Programs:
         gl = gl_context()
         self.current: object = None  # whose look and textures are in place
         self.frame, self.look = gl.buffer(reserve=96, dynamic=True), gl.buffer(reserve=128, dynamic=True)
-        self.static = self._program(shaders.STATIC_VERTEX, shaders.STATIC_FRAGMENT)
-        self.road = self._program(shaders.ROAD_VERTEX, shaders.ROAD_FRAGMENT)
-        self.actor = self._program(shaders.ACTOR_VERTEX, shaders.ACTOR_FRAGMENT)
-        self.shadow = self._program(effects.SHADOW_VERTEX, effects.SHADOW_FRAGMENT)
-        self.glow = self._program(effects.GLOW_VERTEX, effects.GLOW_FRAGMENT)
-        self.sky = self._program(effects.SKY_VERTEX, effects.SKY_FRAGMENT)
-        self.rain = self._program(effects.RAIN_VERTEX, effects.RAIN_FRAGMENT)
+        self.static = compiled(shaders.STATIC_VERTEX, shaders.STATIC_FRAGMENT)
+        self.road = compiled(shaders.ROAD_VERTEX, shaders.ROAD_FRAGMENT)
+        self.actor = compiled(shaders.ACTOR_VERTEX, shaders.ACTOR_FRAGMENT)
+        self.shadow = compiled(effects.SHADOW_VERTEX, effects.SHADOW_FRAGMENT)
+        self.glow = compiled(effects.GLOW_VERTEX, effects.GLOW_FRAGMENT)
+        self.sky = compiled(effects.SKY_VERTEX, effects.SKY_FRAGMENT)
+        self.rain = compiled(effects.RAIN_VERTEX, effects.RAIN_FRAGMENT)
         self.corners = gl.buffer(np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)], "f4").tobytes())
         self.layers = _mipmapped_array(texture_layers())
         self.drops = gl.texture((128, 128), 1, rain_drops().tobytes())
 
-    def _program(self, vertex: str, fragment: str) -> moderngl.Program:
-        program = gl_context().program(vertex_shader=vertex, fragment_shader=fragment)
-        for block, binding in (("Frame", 0), ("Look", 1)):
-            member = program.get(block, None)
-            if isinstance(member, moderngl.UniformBlock):
-                member.binding = binding
-        for unit, sampler in enumerate(("layers", "shadows", "panorama", "drops")):
-            if sampler in program:
-                program[sampler] = unit
-        return program
+
+def compiled(vertex: str, fragment: str) -> moderngl.Program:
+    """A program with its blocks and samplers where all pictures expect them."""
+    program = gl_context().program(vertex_shader=vertex, fragment_shader=fragment)
+    for block, binding in (("Frame", 0), ("Look", 1)):
+        member = program.get(block, None)
+        if isinstance(member, moderngl.UniformBlock):
+            member.binding = binding
+    for unit, sampler in enumerate(("layers", "shadows", "panorama", "drops")):
+        if sampler in program:
+            program[sampler] = unit
+    return program
+
+
+class SemanticPrograms:
+    """The programs that draw classes instead of colours."""
+
+    def __init__(self) -> None:
+        self.road = compiled(semantics.ASPHALT_VERTEX, semantics.ASPHALT_FRAGMENT)
+        self.static = compiled(semantics.STANDING_VERTEX, semantics.STANDING_FRAGMENT)
+        self.actor = compiled(semantics.ACTORS_VERTEX, semantics.ACTORS_FRAGMENT)
+
+
+@lru_cache(maxsize=1)
+def semantic_programs() -> SemanticPrograms:
+    """Those of the process, compiled at the first call."""
+    return SemanticPrograms()
 
 
 @lru_cache(maxsize=1)

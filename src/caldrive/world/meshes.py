@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from caldrive.datatypes import Pose
 
-# uv: texture coordinates and layer. normal: 128 + 127 times x, y, z. slot: which part it is. spare: see the shaders.
+# uv: texture coordinates and layer. normal: 128 + 127 times x, y, z. slot: which part of a car or
+# person it is, or the class of what stands still (semantics.py). spare: see the shaders.
 VERTEX = np.dtype(
     [("position", "3f4"), ("uv", "3f4"), ("normal", "3u1"), ("slot", "u1"), ("color", "3u1"), ("spare", "u1")]
 )

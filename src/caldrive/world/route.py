@@ -135,14 +135,19 @@ def plan_route(roads: RoadNetwork, start: Pose, goal: Pose) -> Route:
     return follow_lanes(roads, [first.id, *best[1]], s, end)
 
 
-def random_route(roads: RoadNetwork, start: Pose, length: float, rng: np.random.Generator) -> Route:
-    """A route of about a length that takes a random turn at every junction (section 3.1, data collection)."""
+def random_route(
+    roads: RoadNetwork, start: Pose, length: float, rng: np.random.Generator, through: str | None = None
+) -> Route:
+    """A route of about a length that takes a random turn at every junction (section 3.1, data collection).
+
+    through: a lane that it takes wherever it can.
+    """
     lane, s = roads.lane_at(start)
     ids, reached = [lane.id], lane.line.length - s
     while reached < length or roads.lanes[ids[-1]].internal:
         successors = roads.lanes[ids[-1]].successors
         if not successors:
             break
-        ids.append(successors[int(rng.integers(len(successors)))])
+        ids.append(through if through in successors else successors[int(rng.integers(len(successors)))])
         reached += roads.lanes[ids[-1]].line.length
     return follow_lanes(roads, ids, s, roads.lanes[ids[-1]].line.length)

@@ -41,7 +41,10 @@ void main() {
     lit = albedo * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * n.z);
     sunlit = albedo * sun.rgb * max(dot(n, sun_direction.xyz), 0.0);
     cell = uv;
-    if (normal.w > 0.0) { lit = max(lit, 0.80 * albedo); sunlit *= 0.4; }  // signs throw the headlamps' light back
+    if (int(normal.w * 255.0 + 0.5) == 9) {  // signs throw the headlamps' light back
+        lit = max(lit, 0.80 * albedo);
+        sunlit *= 0.4;
+    }
     place = vec4((position.xy + 0.8 * color.w * n.xy - shadow_area.xy) * shadow_area.zw, position.z, color.w);
 }
 """
@@ -77,12 +80,7 @@ void main() {
 )
 
 # A line covers as much of a pixel as the pixel's width on the road overlaps it: far lines fade and do not flicker.
-ROAD_FRAGMENT = (
-    BLOCKS
-    + LIGHT
-    + """
-uniform sampler2DArray layers;
-uniform vec3 center_color; uniform vec3 edge_color; uniform vec3 asphalt;
+STRIPES = """
 uniform vec4 widths;     // half widths of centre and edge line, inset of the edge line, share of a dash
 in vec2 ground; in vec3 lane; flat in vec3 kinds; in vec4 place;
 out vec4 pixel;
@@ -90,21 +88,33 @@ float stripe(float at, float footprint, float middle, float half_width) {
     float low = max(at - 0.5 * footprint, middle - half_width), high = min(at + 0.5 * footprint, middle + half_width);
     return clamp((high - low) / footprint, 0.0, 1.0);
 }
+void stripes(vec3 footprint, out float left, out float right, out float stop) {
+    float dash = stripe(fract(lane.y), footprint.y, 0.5, 0.5 * widths.w);
+    dash = mix(dash, widths.w, clamp(2.0 * footprint.y - 0.6, 0.0, 1.0));
+    float broken = kinds.x == 4.0 || kinds.x == 2.0 ? 1.0 : dash;
+    float inset = kinds.x == 2.0 ? widths.z : 0.0;
+    left = kinds.x > 0.0 ? broken * stripe(lane.x, footprint.x, kinds.z - inset, widths.x) : 0.0;
+    right = kinds.y == 2.0 ? stripe(lane.x, footprint.x, widths.z - kinds.z, widths.y) : 0.0;
+    stop = stripe(lane.z, footprint.z, 0.6, 0.25);
+}
+"""
+
+ROAD_FRAGMENT = (
+    BLOCKS
+    + LIGHT
+    + STRIPES
+    + """
+uniform sampler2DArray layers;
+uniform vec3 center_color; uniform vec3 edge_color; uniform vec3 asphalt;
 void main() {
     vec3 footprint = max(fwidth(lane), vec3(1e-4));
     float fine = texture(layers, vec3(ground * 0.14, 1.0)).r, coarse = texture(layers, vec3(ground.yx * 0.019, 1.0)).r;
     float track = clamp(1.0 - 2.2 * abs(abs(lane.x) - 0.85), 0.0, 1.0) * (kinds.z < 4.9 ? 0.09 : 0.0);
     vec3 albedo = asphalt * fine * (0.45 + 0.7 * coarse) * (1.0 - track);
 
-    float wear = 0.55 + 0.5 * fine;
-    float dash = stripe(fract(lane.y), footprint.y, 0.5, 0.5 * widths.w);
-    dash = mix(dash, widths.w, clamp(2.0 * footprint.y - 0.6, 0.0, 1.0));
-    float broken = kinds.x == 4.0 || kinds.x == 2.0 ? 1.0 : dash;
-    float inset = kinds.x == 2.0 ? widths.z : 0.0;
-    float left = kinds.x > 0.0 ? broken * stripe(lane.x, footprint.x, kinds.z - inset, widths.x) : 0.0;
+    float wear = 0.55 + 0.5 * fine, left, right, stop;
+    stripes(footprint, left, right, stop);
     albedo = mix(albedo, kinds.x == 2.0 || kinds.x == 3.0 ? edge_color : center_color, left * wear);
-    float right = kinds.y == 2.0 ? stripe(lane.x, footprint.x, widths.z - kinds.z, widths.y) : 0.0;
-    float stop = stripe(lane.z, footprint.z, 0.6, 0.25);
     albedo = mix(albedo, edge_color, max(right, stop) * wear);
 
     float shine = sunshine(place);

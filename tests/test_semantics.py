@@ -1,0 +1,66 @@
+"""The semantic image: it shows the same scene as the picture, pixel by pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from caldrive.config import CameraConfig
+from caldrive.datatypes import PedestrianState, VehicleState
+from caldrive.geometry import moved
+from caldrive.world.camera import Camera
+from caldrive.world.roads import RoadNetwork
+from caldrive.world.scenery import build_scenery
+from caldrive.world.semantics import Semantic
+from caldrive.world.towns import load_town
+
+MOUNT = CameraConfig(400, 176)
+
+
+@pytest.fixture(scope="module")
+def roads() -> RoadNetwork:
+    return load_town("town01")
+
+
+@pytest.fixture(scope="module")
+def camera(roads: RoadNetwork) -> Iterator[Camera]:
+    made = Camera(roads, build_scenery(roads))
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def approach(roads: RoadNetwork) -> VehicleState:
+    """20 m before a sign."""
+    lane, s = roads.lane_at(roads.signs[0].pose)
+    return VehicleState(lane.line.pose_at(s - 20))
+
+
+def test_a_car_and_a_person_are_where_the_picture_changes(camera: Camera, approach: VehicleState) -> None:
+    car = VehicleState(moved(approach.pose, forward=12, left=0.3), id="a")
+    person = PedestrianState(moved(approach.pose, forward=9, left=3.0, turn=1.5), 1.0, on_road=True, id="b")
+    empty, full = (camera.render(1, approach, c, p, {}, [MOUNT], 0.0)[0] for c, p in (((), ()), ([car], [person])))
+    kinds = camera.render_semantics(approach, [car], [person], [MOUNT])[0]
+    changed = np.abs(full.astype(int) - empty).max(axis=2) > 12
+    for kind in (Semantic.VEHICLE, Semantic.PERSON):
+        assert (kinds == kind).sum() > 150
+        assert changed[kinds == kind].mean() > 0.9
+    # What changes elsewhere is the shadow on the road.
+    assert np.isin(kinds[changed], (Semantic.VEHICLE, Semantic.PERSON, Semantic.ROAD, Semantic.LINE)).mean() > 0.97
+
+
+def test_signs_lights_and_streets_are_told_apart(camera: Camera, roads: RoadNetwork, approach: VehicleState) -> None:
+    kinds = camera.render_semantics(approach, (), (), [MOUNT])[0]
+    assert kinds[-1, 200] in (Semantic.ROAD, Semantic.LINE)
+    assert set(np.unique(kinds)) >= {Semantic.SIGN, Semantic.SIDEWALK, Semantic.BUILDING, Semantic.LINE}
+    lane = roads.lanes[roads.posts[0].lane]
+    before = VehicleState(lane.line.pose_at(lane.line.length - 12))
+    assert Semantic.LIGHT in camera.render_semantics(before, (), (), [MOUNT])[0]
+
+
+def test_looking_at_classes_changes_no_picture(camera: Camera, approach: VehicleState) -> None:
+    first = camera.render(3, approach, (), (), {}, [MOUNT], 0.0)[0]
+    camera.render_semantics(approach, (), (), [MOUNT])
+    assert (camera.render(3, approach, (), (), {}, [MOUNT], 0.0)[0] == first).all()
