@@ -138,14 +138,16 @@ class Train(TrainSettings, Output):
 
         from caldrive.config import PERCEPTIONS, TRAININGS
         from caldrive.driving.outputs import require_writable_folder
+        from caldrive.perception.backbone import imagenet_file
         from caldrive.perception.training import train
 
         require_writable_folder(self.out)
         if self.preset not in TRAININGS:
             raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
-        config = replace(TRAININGS[self.preset], seed=self.seed)
+        config = replace(TRAININGS[self.preset], seed=self.seed, device=self.device)
         config = config if self.steps is None else replace(config, steps=self.steps)
-        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], progress=sys.stderr.isatty())
+        imagenet = self.imagenet or (imagenet_file() if PERCEPTIONS[self.preset].width == 1.0 else None)
+        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
         return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
 
 

@@ -193,7 +193,8 @@ class TrainingConfig:
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
     balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
-    cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu or cuda.
+    cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu, cuda, or
+    auto for a GPU where there is one.
     """
 
     steps: int = 8000
@@ -210,7 +211,7 @@ class TrainingConfig:
     save_every: int = 100
     cache_gb: float = 4.0
     precision: str = "auto"
-    device: str = "cpu"
+    device: str = "auto"
     seed: int = 0
 
 

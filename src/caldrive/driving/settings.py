@@ -134,7 +134,11 @@ class TrainSettings:
     steps: int | None = None
     """Steps of the optimizer, where the preset's are not wanted."""
     preset: str = "small"
-    """small, for two cores, or paper."""
+    """small, for two cores, or paper: full width, from VGG16's ImageNet weights."""
+    imagenet: Path | None = None
+    """VGG16's weights for preset paper (.safetensors or .pth); without it those in torch.hub's cache."""
+    device: str = "auto"
+    """cpu, cuda, or auto for a GPU where there is one; torchrun trains on several."""
     seed: int = 0
     """Decides everything random."""
 

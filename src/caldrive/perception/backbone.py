@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from pickle import UnpicklingError
 
 import torch
 from safetensors import SafetensorError
@@ -15,6 +16,25 @@ CHANNELS = (64, 128, 256, 512, 512)
 DEPTHS = (2, 2, 3, 3, 3)
 # Where a torchvision VGG16 keeps its convolutions.
 IMAGENET_LAYERS = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
+
+
+def imagenet_file() -> Path:
+    """VGG16's weights in torch.hub's cache. Raises ValueError where there are none."""
+    folder = Path(torch.hub.get_dir()) / "checkpoints"
+    found = sorted(folder.glob("vgg16-*.pth"))
+    if not found:
+        raise ValueError(f"found no vgg16-*.pth in {folder}: put VGG16's state dict there, or type --imagenet FILE")
+    return found[0]
+
+
+def _read_state(path: Path) -> dict[str, Tensor]:
+    try:
+        if path.suffix == ".pth":  # weights_only builds tensors and plain values, and runs nothing
+            state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
+            return state
+        return load_file(path)
+    except (OSError, SafetensorError, UnpicklingError, RuntimeError) as error:
+        raise ValueError(f"{path} is missing or no state dict of tensors: give a .safetensors or .pth file") from error
 
 
 class Backbone(nn.Module):
@@ -60,8 +80,8 @@ class Backbone(nn.Module):
         return x.flatten(1)
 
     def load_imagenet(self, path: Path | str) -> None:
-        """Take the convolutions of a torchvision-style VGG16 from a safetensors file (features.N.weight,
-        features.N.bias).
+        """Take the convolutions of a torchvision-style VGG16 (features.N.weight, features.N.bias) from a safetensors
+        file, or a .pth file as in torch.hub's cache.
 
         Raises ValueError where the file is missing, damaged or of another network, or where this one is not full width.
         """
@@ -69,10 +89,7 @@ class Backbone(nn.Module):
             raise ValueError(
                 f"ImageNet weights fit VGG16 at width 1, this backbone has {self.width:g}: set width to 1.0"
             )
-        try:
-            state = load_file(path)
-        except (OSError, SafetensorError) as error:
-            raise ValueError(f"{path} is missing or no safetensors file: convert a VGG16 state dict to one") from error
+        state = _read_state(Path(path))
         for number, conv in zip(IMAGENET_LAYERS, self.convolutions(), strict=True):
             for kind, parameter in conv.named_parameters():
                 name = f"features.{number}.{kind}"

@@ -1,9 +1,11 @@
-"""The curves of a training run as a picture: its loss, and each validation figure, over the steps."""
+"""The curves of a training run: as a picture its loss and each validation figure over the steps, or in TensorBoard."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,23 @@ from caldrive.files import write_figure
 from caldrive.perception.specs import SPECS
 
 SMOOTH = 50  # steps that the loss is averaged over
+
+
+class Board:
+    """A run's figures for TensorBoard, where it is installed; elsewhere nothing happens."""
+
+    def __init__(self, folder: Path, on: bool = True) -> None:
+        self._writer: Any = None
+        if on and find_spec("tensorboard") is not None:
+            from torch.utils.tensorboard import SummaryWriter
+
+            self._writer = SummaryWriter(str(folder))
+
+    def add(self, row: Mapping[str, float]) -> None:
+        """One step's row of the metrics."""
+        if self._writer is not None:
+            for name in row.keys() - {"step"}:
+                self._writer.add_scalar(name, row[name], int(row["step"]))
 
 
 def draw_curves(rows: Sequence[Mapping[str, float]], path: Path) -> None:

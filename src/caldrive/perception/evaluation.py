@@ -34,15 +34,12 @@ def use_bf16(precision: str, device: str) -> bool:
 
 def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
     """The context in which the network computes."""
-    return torch.autocast(device, torch.bfloat16) if use_bf16(precision, device) else nullcontext()
+    return torch.autocast(device.split(":")[0], torch.bfloat16) if use_bf16(precision, device) else nullcontext()
 
 
 def outputs_of(network: Network, batch: Batch, images: Tensor, device: str) -> dict[str, Tensor]:
-    """Normalised images (N, 3, H, W) of a batch to outputs (B * S, K): each frame passes the backbone once."""
-    features = network.features(images.to(device))  # (N, F)
-    windows = features[batch.index.to(device)]  # (B, T, F)
-    outputs: dict[str, Tensor] = network(windows, batch.command.to(device))
-    return outputs
+    """Normalised images (N, 3, H, W) of a batch to outputs (B * S, K)."""
+    return network.on_windows(images.to(device), batch.index.to(device), batch.command.to(device))
 
 
 @torch.no_grad()

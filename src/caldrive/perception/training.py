@@ -1,155 +1,84 @@
-"""The training loop (section 3.1). What a step draws depends on (seed, step) only: a run killed anywhere resumes to the
-same weights."""
+"""Training from a folder of episodes to a network on disk, with its progress, its curves, and a way to go on."""
 
 from __future__ import annotations
 
-import copy
 import json
-import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from torch import Tensor
 from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
-from caldrive.perception.checkpoint import (
-    CheckpointError,
-    CheckpointInfo,
-    read_tensors,
-    round_to_half,
-    save_network,
-    write_tensors,
-)
-from caldrive.perception.curves import draw_curves
+from caldrive.perception.calibration import calibrated
+from caldrive.perception.checkpoint import CheckpointInfo, round_to_half, save_network
+from caldrive.perception.curves import Board, draw_curves
 from caldrive.perception.dataset import Frames, Sampler, find_episodes, split, summary
-from caldrive.perception.evaluation import autocast, evaluate, outputs_of
-from caldrive.perception.images import augment, normalise, to_float
+from caldrive.perception.evaluation import evaluate
 from caldrive.perception.network import Network
-from caldrive.perception.specs import ClassWeights, class_weights, loss
+from caldrive.perception.optimisation import Run, learning_rate
+from caldrive.perception.specs import class_weights
+from caldrive.perception.team import Team, join
 
 Row = dict[str, float]
 
 
-def learning_rate(step: int, config: TrainingConfig) -> float:
-    """Rate of a step: a straight warm-up, then a cosine down to final_rate of the base rate."""
-    if step < config.warm_up:
-        return config.learning_rate * (step + 1) / config.warm_up
-    done = (step - config.warm_up) / max(1, config.steps - config.warm_up)
-    share = config.final_rate + (1 - config.final_rate) * (1 + math.cos(math.pi * done)) / 2
-    return config.learning_rate * share
+@dataclass(frozen=True)
+class Files:
+    """What lies in a training's folder."""
+
+    folder: Path
+
+    @property
+    def model(self) -> Path:
+        return self.folder / "model.safetensors"
+
+    @property
+    def state(self) -> Path:
+        return self.folder / "state.safetensors"
+
+    @property
+    def metrics(self) -> Path:
+        return self.folder / "metrics.jsonl"
+
+    @property
+    def curves(self) -> Path:
+        return self.folder / "curves.png"
+
+    def rows(self, step: int) -> list[Row]:
+        """Rows of the metrics that a run taken up at this step will not write again."""
+        lines = self.metrics.read_text().splitlines() if self.metrics.is_file() else []
+        return [row for row in map(json.loads, lines) if row["step"] <= step]
 
 
-@dataclass
-class Run:
-    """A training run: what changes from step to step, and what is needed to change it."""
-
-    config: TrainingConfig
-    network: Network
-    optimizer: Adam
-    sampler: Sampler
-    weights: ClassWeights
-    step: int = 0
-
-    def advance(self) -> float:
-        """One step; returns its loss."""
-        config, device, network = self.config, self.config.device, self.network
-        generator = torch.Generator().manual_seed(config.seed * 1_000_003 + self.step)
-        torch.manual_seed(config.seed * 1_000_003 + self.step)  # dropout
-        batch = self.sampler.frames.batch(self.sampler.draw(self.step, config.batch), config.window, network.span - 1)
-        images = to_float(batch.images)
-        images = normalise(augment(images, generator, batch.group) if config.augment else images)
-        targets = {name: target.to(device) for name, target in batch.targets.items()}
-        for group in self.optimizer.param_groups:
-            group["lr"] = learning_rate(self.step, config)
-        network.train()
-        with autocast(config.precision, device):
-            outputs = outputs_of(network, batch, images, device)
-        total = loss(outputs, targets, self.weights)
-        self.optimizer.zero_grad(set_to_none=True)
-        total.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(network.parameters(), config.clip)
-        self.optimizer.step()
-        self.step += 1
-        return float(total.detach())
-
-    def save(self, path: Path) -> None:
-        """Write all that the next step depends on."""
-        tensors = {f"network.{name}": value for name, value in self.network.state_dict().items()}
-        for number, state in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
-        header = {"step": self.step, "config": asdict(self.network.config), "training": asdict(self.config)}
-        write_tensors(path, tensors, {"kind": "training"} | header)
-
-    def restore(self, path: Path) -> None:
-        """Take up where `save` left off. Raises CheckpointError where the file belongs to another run."""
-        tensors, header = read_tensors(path)
-        if (header.get("config"), header.get("training")) != (asdict(self.network.config), asdict(self.config)):
-            raise CheckpointError(
-                f"{path} belongs to a run with other settings: give another folder or remove this one"
-            )
-        network = {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}
-        self.network.load_state_dict(network)
-        states: dict[int, dict[str, Tensor]] = {}
-        for name, value in tensors.items():
-            if name.startswith("optimizer."):
-                _, number, part = name.split(".")
-                states.setdefault(int(number), {})[part] = value
-        groups = self.optimizer.state_dict()["param_groups"]
-        self.optimizer.load_state_dict({"state": states, "param_groups": groups})
-        self.step = int(header["step"])
-
-
-def _start(config: TrainingConfig, perception: PerceptionConfig, frames: Frames, imagenet: Path | None) -> Run:
+def start(
+    config: TrainingConfig, perception: PerceptionConfig, frames: Frames, imagenet: Path | None, team: Team
+) -> Run:
+    """A run at its first step."""
     torch.manual_seed(config.seed)
     network = Network(perception)
     if imagenet is not None:
         network.backbone.load_imagenet(imagenet)
-    network = network.to(config.device)
+    network = network.to(team.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
-    weights = {name: weight.to(config.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    return Run(config, network, Adam(network.parameters(), config.learning_rate), sampler, weights)
+    weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
+    return Run(config, network, Adam(network.parameters(), config.learning_rate), sampler, weights, team)
 
 
-def calibrated(run: Run) -> Network:
-    """A copy of the network whose probabilities are those of the recording.
-
-    Weighted and balanced, training sees rare classes as often as the others, and so the network expects them. Moving
-    each class's last bias by the logarithm of (its share of the frames / its share of the loss) takes that back; about,
-    as frames are drawn by the rarest of their labels, not by each.
-    """
-    network = copy.deepcopy(run.network)
-    drawn = run.sampler.class_counts()
-    for name, weight in run.weights.items():
-        count = torch.bincount(run.sampler.frames.targets[name], minlength=len(weight)).double()
-        weighted = weight.cpu().double() * torch.from_numpy(drawn[name])
-        shift = (count / weighted).nan_to_num(0.0).clamp(min=1e-9).log()  # what never occurs is not expected
-        bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
-        bias.data += (shift - shift[0]).to(run.config.device)
-    return network
-
-
-def _validate(run: Run, held: Frames, model: Path) -> Row:
+def validate(run: Run, held: Frames, model: Path) -> Row:
     """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`."""
-    network = calibrated(run)
+    sampler = run.sampler
+    network = calibrated(run.network, sampler.frames, sampler.class_counts(), run.weights)
     round_to_half(network)
-    found = evaluate(network, held, run.config.precision, run.config.device)
-    data = summary(run.sampler.frames, held)
-    save_network(
-        model, network, CheckpointInfo(network.config, data, found, asdict(run.config), run.config.seed), half=True
-    )
+    found = evaluate(network, held, run.config.precision, run.team.device)
+    info = CheckpointInfo(network.config, summary(sampler.frames, held), found, asdict(run.config), run.config.seed)
+    save_network(model, network, info, half=True)
     return {f"validation/{name}": value for name, value in found.items()}
-
-
-def _kept_rows(path: Path, step: int) -> list[Row]:
-    """Rows of the metrics that a resumed run will not write again."""
-    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
-    return [row for row in rows if row["step"] <= step]
 
 
 def train(
@@ -164,32 +93,42 @@ def train(
     """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
 
     In `out` lie also state.safetensors, from which the same call resumes, and metrics.jsonl: a row a step with its
-    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them. `stop` may end the
-    run early after a step.
+    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them, and where
+    TensorBoard is installed it finds them in `out`/tensorboard. `stop` may end the run early after a step. Under
+    torchrun the processes share each batch out, and the first one writes.
     """
-    out, perception = Path(out), perception or PerceptionConfig()
+    files, perception = Files(Path(out)), perception or PerceptionConfig()
+    team = join(config.device, config.batch)
     size = (perception.image_height, perception.image_width)
     train_episodes, held_episodes = split(find_episodes(data), config.validation_share, config.seed)
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
-    run = _start(config, perception, frames, imagenet)
-    model, state, log = out / "model.safetensors", out / "state.safetensors", out / "metrics.jsonl"
-    if state.is_file():
-        run.restore(state)
-    rows = _kept_rows(log, run.step)
-    columns = (MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
-    with Progress(*columns, disable=not progress) as bar:
+    run = start(config, perception, frames, imagenet, team)
+    if files.state.is_file():
+        run.restore(files.state)
+    team.wait()
+    rows, board = files.rows(run.step), Board(files.folder / "tensorboard", team.leads)
+    columns: tuple[Any, ...] = (MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
+    with Progress(*columns, disable=not (progress and team.leads)) as bar:
         task = bar.add_task("training", total=config.steps, completed=run.step, note="")
         while run.step < config.steps and not stop(run.step):
-            began = time.perf_counter()
-            row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": run.advance()}
-            row["windows_per_s"] = config.batch / (time.perf_counter() - began)
-            last = run.step == config.steps
-            if last or run.step % config.evaluate_every == 0:
-                row |= _validate(run, held, model)
-                draw_curves([*rows, row], out / "curves.png")
-            rows.append(row)
-            if last or run.step % config.save_every == 0:
-                write_whole(log, "".join(json.dumps(r) + "\n" for r in rows).encode())
-                run.save(state)
-            bar.update(task, completed=run.step, note=f"loss {row['loss']:.3f}")
-    return model
+            rows.append(_step(run, held, files, rows))
+            board.add(rows[-1])
+            bar.update(task, completed=run.step, note=f"loss {rows[-1]['loss']:.3f}")
+    return files.model
+
+
+def _step(run: Run, held: Frames, files: Files, rows: list[Row]) -> Row:
+    """One step and what belongs after it; returns its row of the metrics."""
+    config, began = run.config, time.perf_counter()
+    row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": run.advance()}
+    row["windows_per_s"] = config.batch / (time.perf_counter() - began)
+    last = run.step == config.steps
+    if last or run.step % config.evaluate_every == 0:
+        if run.team.leads:
+            row |= validate(run, held, files.model)
+            draw_curves([*rows, row], files.curves)
+        run.team.wait()
+    if run.team.leads and (last or run.step % config.save_every == 0):
+        write_whole(files.metrics, "".join(json.dumps(r) + "\n" for r in [*rows, row]).encode())
+        run.save(files.state)
+    return row

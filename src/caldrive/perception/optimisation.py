@@ -1,0 +1,111 @@
+"""The steps of a training (section 3.1). What a step draws depends on (seed, step) only: a run killed anywhere resumes
+to the same weights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
+from torch.optim import Adam
+
+from caldrive.config import TrainingConfig
+from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
+from caldrive.perception.dataset import Sampler
+from caldrive.perception.evaluation import autocast
+from caldrive.perception.images import augment, normalise, to_float
+from caldrive.perception.network import Network
+from caldrive.perception.specs import ClassWeights, loss
+from caldrive.perception.team import Team
+
+
+def learning_rate(step: int, config: TrainingConfig) -> float:
+    """Rate of a step: a straight warm-up, then a cosine down to final_rate of the base rate."""
+    if step < config.warm_up:
+        return config.learning_rate * (step + 1) / config.warm_up
+    done = (step - config.warm_up) / max(1, config.steps - config.warm_up)
+    share = config.final_rate + (1 - config.final_rate) * (1 + math.cos(math.pi * done)) / 2
+    return config.learning_rate * share
+
+
+class _Windows(nn.Module):
+    """The network as one call from images to outputs, which is what DistributedDataParallel looks after."""
+
+    def __init__(self, network: Network) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, images: Tensor, index: Tensor, command: Tensor) -> dict[str, Tensor]:
+        return self.network.on_windows(images, index, command)
+
+
+@dataclass
+class Run:
+    """A training run: what changes from step to step, and what is needed to change it."""
+
+    config: TrainingConfig
+    network: Network
+    optimizer: Adam
+    sampler: Sampler
+    weights: ClassWeights
+    team: Team
+    step: int = 0
+    model: nn.Module = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.model = _Windows(self.network)
+        if self.team.size > 1:  # a batch without some command leaves its group of nodes without a gradient
+            self.model = DistributedDataParallel(self.model, find_unused_parameters=True)
+
+    def advance(self) -> float:
+        """One step; returns its loss, where there are several processes that of this one's share of the batch."""
+        config, team = self.config, self.team
+        seed = (config.seed * 1_000_003 + self.step) * team.size + team.rank
+        generator = torch.Generator().manual_seed(seed)
+        torch.manual_seed(seed)  # dropout
+        starts = self.sampler.draw(self.step, config.batch)[team.rank :: team.size]
+        batch = self.sampler.frames.batch(starts, config.window, self.network.span - 1)
+        images = to_float(batch.images)
+        images = normalise(augment(images, generator, batch.group) if config.augment else images)
+        targets = {name: target.to(team.device) for name, target in batch.targets.items()}
+        for group in self.optimizer.param_groups:
+            group["lr"] = learning_rate(self.step, config)
+        self.model.train()
+        with autocast(config.precision, team.device):
+            outputs = self.model(*(x.to(team.device) for x in (images, batch.index, batch.command)))
+        total = loss(outputs, targets, self.weights)
+        self.optimizer.zero_grad(set_to_none=True)
+        total.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), config.clip)
+        self.optimizer.step()
+        self.step += 1
+        return float(total.detach())
+
+    def save(self, path: Path) -> None:
+        """Write all that the next step depends on."""
+        tensors = {f"network.{name}": value for name, value in self.network.state_dict().items()}
+        for number, state in self.optimizer.state_dict()["state"].items():
+            tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
+        header = {"step": self.step, "config": asdict(self.network.config), "training": asdict(self.config)}
+        write_tensors(path, tensors, {"kind": "training"} | header)
+
+    def restore(self, path: Path) -> None:
+        """Take up where `save` left off. Raises CheckpointError where the file belongs to another run."""
+        tensors, header = read_tensors(path)
+        if (header.get("config"), header.get("training")) != (asdict(self.network.config), asdict(self.config)):
+            raise CheckpointError(
+                f"{path} belongs to a run with other settings: give another folder or remove this one"
+            )
+        network = {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}
+        self.network.load_state_dict(network)
+        states: dict[int, dict[str, Tensor]] = {}
+        for name, value in tensors.items():
+            if name.startswith("optimizer."):
+                _, number, part = name.split(".")
+                states.setdefault(int(number), {})[part] = value
+        groups = self.optimizer.state_dict()["param_groups"]
+        self.optimizer.load_state_dict({"state": states, "param_groups": groups})
+        self.step = int(header["step"])
