@@ -274,17 +274,12 @@ def test_semantic_images_are_recorded_where_they_are_asked_for(unbroken: Path, t
         plain.semantic(5)
 
 
-def _dies_once(config: CollectConfig, number: int, folder: Path) -> int:
+def _dies_once(config: CollectConfig, folder: Path, number: int) -> int:
     mark = folder / "died"
     if number == 1 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return _record(config, number, folder)
-
-
-def _dies(config: CollectConfig, number: int, folder: Path) -> int:
-    os.kill(os.getpid(), signal.SIGKILL)
-    return 0
+    return _record(config, folder, number)
 
 
 def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
@@ -293,9 +288,3 @@ def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
     monkeypatch.setattr(collection, "_record", _dies_once)
     list(collect(TINY, tmp_path, workers=2))
     assert contents(tmp_path) == contents(unbroken)
-
-
-def test_workers_that_always_die_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collection, "_record", _dies)
-    with pytest.raises(RuntimeError, match="type --workers 1"):
-        list(collect(TINY, tmp_path, workers=2))

@@ -9,10 +9,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, replace
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +20,7 @@ from caldrive.config import CameraConfig, CollectConfig, ControlConfig
 from caldrive.control.controller import Controller
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Command, Control, Observation, Pose, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.driving.pool import spread
 from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
 from caldrive.files import write_whole
 from caldrive.world.embedded import EmbeddedWorld
@@ -33,7 +32,6 @@ from caldrive.world.weather import weather
 T = TypeVar("T")
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
-MOST_DEATHS = 3  # of workers in a row
 MAX_YAW = math.radians(15)
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
 
@@ -175,7 +173,7 @@ def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[Observatio
 _world: EmbeddedWorld | None = None
 
 
-def _record(config: CollectConfig, number: int, folder: Path) -> int:
+def _record(config: CollectConfig, folder: Path, number: int) -> int:
     """One episode in this process' own world."""
     global _world
     if _world is None:
@@ -234,24 +232,7 @@ def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[t
     """
     _check(config, workers)
     _claim(folder, config)
-    if workers == 1:
-        yield from ((k, _record(config, k, folder)) for k in _missing(config, folder))
-        return
-    deaths = 0
-    while missing := _missing(config, folder):
-        done = False
-        try:
-            with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-                jobs = [(k, pool.submit(_record, config, k, folder)) for k in missing]
-                for k, job in jobs:
-                    yield k, job.result()
-                    done = True
-        except BrokenProcessPool as error:
-            deaths = 0 if done else deaths + 1
-            if deaths == MOST_DEATHS:
-                raise RuntimeError(
-                    f"found that recording workers die, {deaths} times in a row: type --workers 1 to see why"
-                ) from error
+    yield from spread(partial(_record, config, folder), _missing(config, folder), workers)
 
 
 def _missing(config: CollectConfig, folder: Path) -> list[int]:

@@ -1,0 +1,40 @@
+"""Work for several processes on one machine. A worker that dies takes nothing with it: its work is done again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+MOST_DEATHS = 3  # of workers, one after the other, while nothing gets done
+
+
+def spread(work: Callable[[T], R], items: Sequence[T], workers: int) -> Iterator[tuple[T, R]]:
+    """Does the work on all items; yields each with its result as it is done. One worker is this process itself.
+
+    What a work returns may depend on its item only, not on what its process did before. Raises RuntimeError where
+    workers die again and again.
+    """
+    if workers == 1:
+        yield from ((item, work(item)) for item in items)
+        return
+    left, deaths = list(range(len(items))), 0
+    while left:
+        before = len(left)
+        try:
+            with ProcessPoolExecutor(min(workers, len(left)), mp_context=get_context("spawn")) as pool:
+                jobs = {pool.submit(work, items[k]): k for k in left}
+                for job in as_completed(jobs):
+                    result = job.result()
+                    left.remove(jobs[job])
+                    yield items[jobs[job]], result
+        except BrokenProcessPool as error:
+            deaths = deaths + 1 if len(left) == before else 0
+            if deaths == MOST_DEATHS:
+                raise RuntimeError(
+                    f"found that workers die, {deaths} times in a row: type --workers 1 to see what happens"
+                ) from error
