@@ -6,6 +6,7 @@ What a verb needs is imported when it runs, so that `caldrive --help` waits for 
 from __future__ import annotations
 
 import sys
+import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +16,7 @@ from tyro.conf import subcommand
 
 from caldrive.driving.settings import (
     AgentSpeedSettings,
+    BenchmarkSettings,
     CollectSettings,
     DataSettings,
     DeterminismSettings,
@@ -52,6 +54,31 @@ class Drive(DriveSettings, Output):
 
         report = drive(self, progress)
         return Answer(report.values(), drive_table(report), int(self.strict and not report.all_reached))
+
+
+@dataclass(frozen=True)
+class Benchmark(BenchmarkSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.benchmark import benchmark, read_results
+        from caldrive.driving.measures import cells, rates
+        from caldrive.driving.tables_benchmark import benchmark_table
+
+        began, driven, good = time.perf_counter(), 0, 0
+        for done, of, success in benchmark(self):
+            driven, good = driven + 1, good + success
+            pace = driven / (time.perf_counter() - began)
+            left = (of - done) / pace / 60
+            label = (
+                f"{done} of {of}, {100 * good / driven:.0f} % reached, {60 * pace:.0f} a minute, {left:.0f} min left"
+            )
+            progress(label, done / of)
+        found = read_results(self)
+        values = {
+            "out": str(self.out),
+            "cells": [asdict(cell) | {"percent": cell.percent, "interval": cell.interval} for cell in cells(found)],
+            "infractions": {rate.kind.value: {"count": rate.count, "km": rate.km} for rate in rates(found)},
+        }
+        return Answer(values, benchmark_table(found, str(self.out)))
 
 
 @dataclass(frozen=True)
@@ -197,6 +224,7 @@ Speed = (
 )
 Command = (
     Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
+    | Annotated[Benchmark, subcommand("benchmark", description="Drive a whole suite, and count.")]
     | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
     | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
     | Annotated[Data, subcommand("data", description="Check and describe a recording.")]

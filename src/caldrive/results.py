@@ -13,6 +13,7 @@ class Outcome(Enum):
 
     SUCCESS = "reached the goal in time"
     TIMEOUT = "ran out of time"
+    FAILED = "broke a rule that ends the episode"
     ABORTED = "was stopped before its end"
 
 

@@ -183,7 +183,7 @@ def _record(config: CollectConfig, folder: Path, number: int) -> int:
 
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
-    least = {"episodes": 1, "duration": 0.1, "width": 16, "height": 16, "seed": 0, "workers": 1}
+    least = {"episodes": 1, "duration": 0.1, "cars": 0, "people": 0, "width": 16, "height": 16, "seed": 0, "workers": 1}
     asked = asdict(config) | {"workers": workers}
     for name, low in least.items():
         if not asked[name] >= low:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Collection
 
 import numpy as np
 
@@ -71,10 +72,11 @@ def comfort(times: list[float], speeds: list[float], centers: list[float]) -> di
 
 
 class Referee:
-    """One episode's referee. infractions: those so far, each once, with its time and place."""
+    """One episode's referee. infractions: those so far, each once, with its time and place. fatal: infractions that end
+    the episode as a failure."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self.scenario = scenario
+    def __init__(self, scenario: Scenario, fatal: Collection[InfractionKind] = ()) -> None:
+        self.scenario, self.fatal = scenario, fatal
         self.infractions: list[Infraction] = []
         self.outcome: Outcome | None = None
         self._frame = 0
@@ -92,7 +94,9 @@ class Referee:
         self._watch_contacts(truth)
         self._watch_lights(truth)
         self._note(truth)
-        if truth.goal_distance <= GOAL_RADIUS:
+        if any(one.kind in self.fatal for one in self.infractions):
+            self.outcome = Outcome.FAILED
+        elif truth.goal_distance <= GOAL_RADIUS:
             self.outcome = Outcome.SUCCESS
         elif truth.time >= self.scenario.time_limit:
             self.outcome = Outcome.TIMEOUT

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 from caldrive.datatypes import Scenario, Step
 from caldrive.driving.referee import Referee
 from caldrive.interfaces import Agent, World
-from caldrive.results import EpisodeResult
+from caldrive.results import EpisodeResult, InfractionKind
 
 
 def rollout(world: World, agent: Agent, scenario: Scenario) -> Iterator[Step]:
@@ -21,10 +21,15 @@ def rollout(world: World, agent: Agent, scenario: Scenario) -> Iterator[Step]:
 
 
 def run_episode(
-    world: World, agent: Agent, scenario: Scenario, on_step: Callable[[Step], None] | None = None
+    world: World,
+    agent: Agent,
+    scenario: Scenario,
+    on_step: Callable[[Step], None] | None = None,
+    fatal: Collection[InfractionKind] = (),
 ) -> EpisodeResult:
-    """Drive until the goal is reached or time is up; on_step sees every step, the last included."""
-    referee = Referee(scenario)
+    """Drive until the goal is reached, time is up or a fatal infraction is committed; on_step sees every step, the last
+    included."""
+    referee = Referee(scenario, fatal)
     for step in rollout(world, agent, scenario):
         outcome = referee.watch(step.truth)
         if on_step is not None:

@@ -58,6 +58,32 @@ class DriveSettings(DriverSettings):
 
 
 @dataclass(frozen=True)
+class BenchmarkSettings:
+    """Drive a whole suite; what a folder holds already is kept, and the rest is driven."""
+
+    suite: str = "quick"
+    """corl2017, nocrash, traffic-school, quick, or a .json file with trials."""
+    agent: str = "cal"
+    """Who drives: cal sees the camera image only, oracle knows the truth."""
+    model: Path | None = None
+    """The network of cal, a .safetensors file; without it the one in the package."""
+    out: Path = Path("out/benchmark")
+    """Folder for results.jsonl, a line an episode, and run.json, which says what drove."""
+    workers: int = 2
+    """Processes that drive at the same time."""
+    cap: float = 20.0
+    """A speed in km/h that no limit exceeds, as in the paper's comparison."""
+    signs: bool = False
+    """Obey the speed signs instead of --cap."""
+    preset: str = "default"
+    """The controller: default, or paper for the laws as printed."""
+    time_limit: str = "paper"
+    """paper: the path at 10 km/h; code: the authors' path at 5 km/h plus 10 s."""
+    seed: int = 0
+    """Decides everything random: traffic, pedestrians, lights."""
+
+
+@dataclass(frozen=True)
 class DeterminismSettings(DriverSettings):
     """Drive the same episode in two fresh processes and compare every image, control and truth."""
 
@@ -111,6 +137,10 @@ class CollectSettings:
     """How many episodes the folder holds in the end."""
     duration: float = CollectConfig.duration
     """Simulated seconds of each."""
+    cars: int = CollectConfig.cars
+    """Other cars."""
+    people: int = CollectConfig.people
+    """Pedestrians, who cross more often than usual."""
     width: int = CollectConfig.width
     """Width of the images in pixels; the preset paper takes 320."""
     height: int = CollectConfig.height

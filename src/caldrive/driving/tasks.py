@@ -88,11 +88,13 @@ def scenarios(
     people: int | None = None,
     seed: int = 0,
     time_limit: str = "paper",
+    name: str | None = None,
 ) -> list[Scenario]:
     """The 25 scenarios of a task.
 
     cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02).
-    time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s.
+    time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s. name: the scenarios' task,
+    where it is called something else.
     """
     if time_limit not in ("paper", "code"):
         raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: give time_limit='paper'")
@@ -102,7 +104,7 @@ def scenarios(
     for i, (start, goal) in enumerate(routes(town, task, seed)):
         route = plan_route(load_town(town), start, goal)
         limit = route.time_limit if time_limit == "paper" else route.length / (5 * KMH) + 10
-        found.append(Scenario(town, weather, start, goal, n_cars, n_people, limit, seed * 1000 + i, task))
+        found.append(Scenario(town, weather, start, goal, n_cars, n_people, limit, seed * 1000 + i, name or task))
     return found
 
 

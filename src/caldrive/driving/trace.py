@@ -9,8 +9,8 @@ from typing import Any
 
 from caldrive.config import KMH
 from caldrive.datatypes import Affordances, Step
-from caldrive.episodes import scenario_to_json
-from caldrive.results import EpisodeResult
+from caldrive.episodes import scenario_from_json, scenario_to_json
+from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 
 TRACE_VERSION = 1
 DIGITS = 4
@@ -54,6 +54,17 @@ class Trace:
 def mean_speed(result: EpisodeResult) -> float:
     """km/h over the whole episode, stops included."""
     return result.distance / result.duration / KMH if result.duration > 0 else 0.0
+
+
+def result_from_values(values: dict[str, Any]) -> EpisodeResult:
+    """The inverse of `result_values`, up to its rounding."""
+    broken = [Infraction(**one | {"kind": InfractionKind(one["kind"])}) for one in values["infractions"]]
+    names = ("duration", "distance", "route_done", "route_length")
+    figures = {name: math.inf if values[name] is None else values[name] for name in names}
+    scenario = scenario_from_json(json.dumps(values["scenario"]))
+    return EpisodeResult(
+        scenario, Outcome[values["outcome"].upper()], **figures, infractions=tuple(broken), comfort=values["comfort"]
+    )
 
 
 def result_values(result: EpisodeResult) -> dict[str, Any]:

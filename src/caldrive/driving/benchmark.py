@@ -1,0 +1,153 @@
+"""The runner: drives a suite with several workers, and can be killed at any moment.
+
+Every episode is one line in results.jsonl, appended when it is done. What a trial gives depends on the trial and on
+what drives only, so the lines of a run that was broken off ten times are those of an unbroken one, in another order.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+from caldrive.datatypes import Step
+from caldrive.driving.behaviour import Behaviour
+from caldrive.driving.drivers import model_path, set_up
+from caldrive.driving.outputs import require_writable_folder
+from caldrive.driving.pool import spread
+from caldrive.driving.rollout import run_episode
+from caldrive.driving.settings import BenchmarkSettings, DriverSettings
+from caldrive.driving.suites import Trial, suite
+from caldrive.driving.trace import plain, result_from_values, result_values
+from caldrive.files import write_whole
+from caldrive.results import EpisodeResult
+
+PACKAGE = Path(__file__).parents[1]
+RESULTS, RUN = "results.jsonl", "run.json"
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A trial and how it went. figures: those of `Behaviour`, by name."""
+
+    trial: Trial
+    result: EpisodeResult
+    figures: dict[str, Any]
+
+
+def code_version() -> str:
+    """Tells this code from any other: a digest of all sources and data of the package, its models left aside."""
+    digest = hashlib.sha256()
+    for path in sorted(PACKAGE.rglob("*")):
+        if path.is_file() and path.suffix not in (".pyc", ".safetensors"):
+            digest.update(str(path.relative_to(PACKAGE)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _identity(settings: BenchmarkSettings) -> dict[str, Any]:
+    """What a folder's results depend on."""
+    model = None
+    if settings.agent == "cal":
+        model = hashlib.sha256(model_path(settings.model).read_bytes()).hexdigest()[:16]
+    content = (
+        hashlib.sha256(Path(settings.suite).read_bytes()).hexdigest()[:16] if settings.suite[-5:] == ".json" else ""
+    )
+    return {
+        "suite": settings.suite + (content and f" {content}"), "agent": settings.agent, "model": model,
+        "cap": None if settings.signs else settings.cap, "preset": settings.preset,
+        "time_limit": settings.time_limit, "seed": settings.seed, "code": code_version(),
+    }  # fmt: skip
+
+
+def _claim(settings: BenchmarkSettings) -> None:
+    """Writes down whose results a folder holds. Raises ValueError where they are another's."""
+    path, wanted = settings.out / RUN, _identity(settings)
+    if not path.is_file():
+        write_whole(path, (json.dumps(wanted, indent=2) + "\n").encode())
+        return
+    try:
+        found = dict(json.loads(path.read_text()))
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"found that {path} is damaged, wanted a run's description: give another --out") from error
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise ValueError(
+                f"found in {settings.out} results with {name} {found.get(name)}, wanted {value}: give another --out"
+            )
+
+
+def read_lines(path: Path) -> dict[str, dict[str, Any]]:
+    """The lines of a results file by trial. One that was being written when the run was killed is no line."""
+    lines = path.read_bytes().split(b"\n")[:-1] if path.is_file() else []
+    try:
+        found = [json.loads(line) for line in lines]
+        return {str(one["key"]): one for one in found}
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"found a damaged line in {path} ({error}), wanted results: give another --out") from error
+
+
+def _append(path: Path, values: dict[str, Any]) -> None:
+    """One more line, on the disk when this returns. Cuts off the rest of a line that was broken off."""
+    with path.open("ab+") as file:
+        file.seek(0)
+        file.truncate(file.read().rfind(b"\n") + 1)
+        file.write(json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@lru_cache(maxsize=1)
+def _set_up(driver: DriverSettings) -> Any:
+    """One world and agent for each process."""
+    return set_up(driver)
+
+
+def drive_trial(driver: DriverSettings, trial: Trial) -> dict[str, Any]:
+    """Drives one trial; returns its line."""
+    world, agent = _set_up(driver)
+    behaviour = Behaviour(world.dt)
+
+    def watch(step: Step) -> None:
+        behaviour.add(step)
+
+    result = run_episode(world, agent, trial.scenario, watch, trial.fatal)
+    figures = behaviour.figures(result.infractions)
+    return {"key": trial.key, "result": result_values(result), "figures": {k: plain(v) for k, v in figures.items()}}
+
+
+def read_results(settings: BenchmarkSettings) -> list[Driven]:
+    """What a folder holds of a suite, in the suite's order."""
+    lines = read_lines(settings.out / RESULTS)
+    trials = suite(settings.suite, settings.seed, settings.time_limit)
+    return [
+        Driven(trial, result_from_values(lines[trial.key]["result"]), lines[trial.key]["figures"])
+        for trial in trials
+        if trial.key in lines
+    ]
+
+
+def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
+    """Drives the trials that a folder lacks; yields how many are done, of how many, and whether the last one succeeded.
+
+    Raises ValueError where the folder belongs to another run, RuntimeError where workers keep dying.
+    """
+    if settings.workers < 1:
+        raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
+    trials = suite(settings.suite, settings.seed, settings.time_limit)
+    cap = None if settings.signs else settings.cap
+    driver = DriverSettings(agent=settings.agent, model=settings.model, preset=settings.preset, cap=cap)
+    require_writable_folder(settings.out)
+    _claim(settings)
+    path = settings.out / RESULTS
+    known = read_lines(path)
+    missing = [trial for trial in trials if trial.key not in known]
+    done = len(trials) - len(missing)
+    for _, line in spread(partial(drive_trial, driver), missing, settings.workers):
+        _append(path, line)
+        done += 1
+        yield done, len(trials), line["result"]["outcome"] == "success"

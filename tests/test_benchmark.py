@@ -1,0 +1,100 @@
+"""The runner: broken off anywhere it ends with the results of an unbroken run, and it mixes no two runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from caldrive.driving import benchmark as runner
+from caldrive.driving.benchmark import benchmark, read_lines, read_results
+from caldrive.driving.settings import BenchmarkSettings
+from caldrive.driving.suites import suite, to_json
+from caldrive.world.traffic import stop_sumo
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> BenchmarkSettings:
+    """Four trials of three seconds, one of them among others."""
+    folder = tmp_path_factory.mktemp("suite")
+    trials = [replace(one, scenario=replace(one.scenario, time_limit=3.0)) for one in suite("quick")[4:8]]
+    (folder / "short.json").write_text(to_json(trials))
+    return BenchmarkSettings(str(folder / "short.json"), "oracle", out=folder / "whole", workers=1)
+
+
+@pytest.fixture(autouse=True)
+def _fresh() -> Iterator[None]:
+    runner._set_up.cache_clear()
+    yield
+    runner._set_up.cache_clear()
+    stop_sumo()
+
+
+@pytest.fixture(scope="module")
+def whole(settings: BenchmarkSettings) -> BenchmarkSettings:
+    assert [done for done, _, _ in benchmark(settings)] == [1, 2, 3, 4]
+    return settings
+
+
+def lines(settings: BenchmarkSettings) -> list[bytes]:
+    return sorted((settings.out / "results.jsonl").read_bytes().splitlines())
+
+
+def test_a_run_broken_off_goes_on_to_the_same_results(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    broken = replace(whole, out=tmp_path)
+    run = benchmark(broken)
+    next(run)
+    run.close()
+    with (tmp_path / "results.jsonl").open("ab") as file:  # as if killed while writing
+        file.write(b'{"key": "tow')
+    assert len(read_lines(tmp_path / "results.jsonl")) == 1
+    assert [done for done, _, _ in benchmark(broken)] == [2, 3, 4]
+    assert lines(broken) == lines(whole)
+    assert read_results(broken) == read_results(whole)
+    assert list(benchmark(broken)) == []
+
+
+def test_two_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    two = replace(whole, out=tmp_path, workers=2)
+    list(benchmark(two))
+    assert lines(two) == lines(whole)
+
+
+def test_results_stand_in_the_suites_order(whole: BenchmarkSettings) -> None:
+    found = read_results(whole)
+    assert [one.trial for one in found] == suite(whole.suite)
+    assert all(one.result.duration == pytest.approx(3.0, abs=0.11) for one in found)
+    assert all(one.figures["error/center_distance"] == 0 for one in found)  # the oracle's
+
+
+@pytest.mark.parametrize("change", [{"seed": 1}, {"signs": True}, {"cap": 30.0}, {"preset": "paper"}])
+def test_results_of_another_run_are_not_added_to(whole: BenchmarkSettings, change: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match="give another --out"):
+        next(benchmark(replace(whole, **change)))  # type: ignore[arg-type]
+
+
+def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "code_version", lambda: "other")
+    with pytest.raises(ValueError, match="with code"):
+        next(benchmark(whole))
+
+
+def test_damaged_files_are_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    out = replace(whole, out=tmp_path)
+    next(benchmark(out))
+    (tmp_path / "results.jsonl").write_bytes(b"nonsense\n")
+    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
+        next(benchmark(out))
+    (tmp_path / "run.json").write_text("[1")
+    with pytest.raises(ValueError, match=r"run\.json is damaged"):
+        next(benchmark(out))
+
+
+def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:
+    found = json.loads((whole.out / "run.json").read_text())
+    assert found["agent"] == "oracle"
+    assert found["cap"] == 20.0
+    assert found["code"] == runner.code_version()

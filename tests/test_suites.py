@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from caldrive.driving.suites import COLLISIONS, OFFENCES, from_json, suite, to_json
+from caldrive.results import InfractionKind
+
+
+def test_corl2017_has_25_routes_of_each_task_in_each_weather_of_each_condition() -> None:
+    trials = suite("corl2017")
+    assert len(trials) == 1200
+    assert len({one.key for one in trials}) == 1200
+    counts = Counter((one.condition, one.scenario.task) for one in trials)
+    assert len(counts) == 16
+    assert {n for (condition, _), n in counts.items() if "weather" in condition} == {50}
+    assert {n for (condition, _), n in counts.items() if "weather" not in condition} == {100}
+    weathers = {(one.scenario.town, one.scenario.weather) for one in trials if one.condition == "new town + weather"}
+    assert weathers == {("town02", 4), ("town02", 14)}
+
+
+def test_its_first_third_has_seen_every_cell() -> None:
+    assert len({(one.condition, one.scenario.task) for one in suite("corl2017")[:400]}) == 16
+
+
+def test_only_the_dynamic_task_has_others_on_the_road() -> None:
+    traffic = {
+        (one.scenario.town, one.scenario.task): (one.scenario.n_vehicles, one.scenario.n_pedestrians)
+        for one in suite("corl2017")
+    }
+    assert traffic["town01", "navigation-dynamic"] == (20, 50)
+    assert traffic["town02", "navigation-dynamic"] == (15, 50)
+    assert {n for (_, task), n in traffic.items() if task != "navigation-dynamic"} == {(0, 0)}
+
+
+@pytest.mark.parametrize(("name", "fatal"), [("nocrash", COLLISIONS), ("traffic-school", OFFENCES)])
+def test_nocrash_ends_at_collisions_and_traffic_school_at_every_offence(
+    name: str, fatal: tuple[InfractionKind, ...]
+) -> None:
+    trials = suite(name)
+    assert {one.fatal for one in trials} == {fatal}
+    dense = {(s.town, s.n_vehicles, s.n_pedestrians) for s in (one.scenario for one in trials) if s.task == "dense"}
+    assert dense == {("town01", 100, 250), ("town02", 70, 150)}
+
+
+def test_the_authors_time_limit_is_longer() -> None:
+    short, long = (suite("quick", time_limit=name)[0].scenario.time_limit for name in ("paper", "code"))
+    assert long == pytest.approx(2 * short + 10)
+
+
+def test_a_suite_of_ones_own_is_read_from_a_file(tmp_path: Path) -> None:
+    mine, path = suite("quick", seed=3)[3:7], tmp_path / "mine.json"
+    path.write_text(to_json(mine))
+    assert suite(str(path)) == mine
+
+
+def test_files_that_are_no_suites_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "suite.json"
+    with pytest.raises(ValueError, match=r"no suite .*suite\.json"):
+        from_json(path)
+    for content in ("", "{}", "[]", '[{"key": "a"}]', to_json(suite("quick")[:1] * 2), '[{"key": 1, "fatal": ["x"]}]'):
+        path.write_text(content)
+        with pytest.raises(ValueError, match=r"suite\.json"):
+            from_json(path)
+    with pytest.raises(ValueError, match="type --suite quick"):
+        suite("corl")
