@@ -10,7 +10,7 @@ MODEL := out/model
 
 .PHONY: drive test lint model clean
 drive: $(READY)
-	$(BIN)/caldrive drive --task straight --cars 20 --people 50 --out out/drive $(ARGS)
+	$(BIN)/caldrive drive --town town02 --weather 14 --task navigation-dynamic --cap 20 --out out/drive $(ARGS)
 
 test: $(READY) lint
 	$(BIN)/pytest -n 2 $(ARGS)
@@ -29,7 +29,9 @@ model: $(READY)
 	step data $(MODEL)/recording --picture $(MODEL)/recording.png; \
 	step train --data $(MODEL)/recording --out $(MODEL)/training; \
 	step evaluate --data $(MODEL)/recording --model $(MODEL)/training/model.safetensors --held-out --worst $(MODEL)/worst.png; \
-	step drive --model $(MODEL)/training/model.safetensors --task one-turn --cap 20 --episodes 25 --no-video --out $(MODEL)/drive; \
+	step collect --out $(MODEL)/elsewhere --town town02 --weathers 4 14 --episodes 24 --cars 15 --people 50; \
+	step evaluate --data $(MODEL)/elsewhere --model $(MODEL)/training/model.safetensors; \
+	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
 $(READY): pyproject.toml constraints.txt

@@ -157,6 +157,14 @@ def test_time_is_up_at_the_limit_and_the_goal_goes_first() -> None:
     assert Referee(scenario).watch(frame(5, goal_distance=1.0)) is Outcome.SUCCESS
 
 
+def test_a_fatal_infraction_ends_the_episode_even_at_the_goal() -> None:
+    frames = [frame(i, lights=light(LightState.RED), goal_distance=50.0 - i) for i in range(60)]
+    strict, lax = Referee(SCENARIO, fatal=(InfractionKind.RED_LIGHT,)), Referee(SCENARIO)
+    assert next(outcome for one in frames if (outcome := strict.watch(one))) is Outcome.FAILED
+    assert next(outcome for one in frames if (outcome := lax.watch(one))) is Outcome.SUCCESS
+    assert [one.kind for one in lax.infractions] == [InfractionKind.RED_LIGHT]
+
+
 def test_result_sums_up_the_drive() -> None:
     result = watched([frame(i, route_done=float(i), route_length=100.0) for i in range(31)]).result()
     assert result.outcome is Outcome.ABORTED

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -142,16 +142,8 @@ class Collect(CollectSettings, Output):
         from caldrive.perception.dataset import class_counts, find_episodes
 
         require_writable_folder(self.out)
-        config = CollectConfig(
-            self.town,
-            self.weathers,
-            self.episodes,
-            self.duration,
-            width=self.width,
-            height=self.height,
-            semantic=self.semantic,
-            seed=self.seed,
-        )
+        asked = {field.name: getattr(self, field.name) for field in fields(CollectConfig) if hasattr(self, field.name)}
+        config = CollectConfig(**asked)
         for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
             progress(f"recording, {done} done", done / self.episodes)
         counts = class_counts(find_episodes(self.out))
