@@ -81,6 +81,27 @@ class Benchmark(BenchmarkSettings, Output):
         return Answer(values, benchmark_table(found, str(self.out)))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Replay(Output):
+    folder: tyro.conf.Positional[Path]
+    """A benchmark's folder."""
+    episode: tyro.conf.Positional[str]
+    """The episode's key, as in results.jsonl: town01-w01-navigation-10."""
+    out: Path = Path("out/replay.mp4")
+    """The video."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.replay import replay
+        from caldrive.driving.trace import result_values
+
+        found = replay(self.folder, self.episode, self.out, progress)
+        broken = ", ".join(f"{one.kind.value} at {one.time:.1f} s" for one in found.result.infractions) or "none"
+        said = f"{self.episode} {found.result.outcome.value}; infractions: {broken}; video: {found.video}"
+        same = "as before" if found.same else "not as before: other code, another model or no earlier result"
+        values = {"video": str(found.video), "same": found.same, "result": result_values(found.result)}
+        return Answer(values, f"{said}; {same}", int(not found.same))
+
+
 @dataclass(frozen=True)
 class Town(Output):
     town: str = "town01"
@@ -217,6 +238,7 @@ Speed = (
 Command = (
     Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
     | Annotated[Benchmark, subcommand("benchmark", description="Drive a whole suite, and count.")]
+    | Annotated[Replay, subcommand("replay", description="Drive a benchmark's episode again, and film it.")]
     | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
     | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
     | Annotated[Data, subcommand("data", description="Check and describe a recording.")]

@@ -24,6 +24,7 @@ from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
 from caldrive.driving.suites import Trial, suite
 from caldrive.driving.trace import plain, result_from_values, result_values
+from caldrive.driving.witness import Witness
 from caldrive.files import write_whole
 from caldrive.results import EpisodeResult
 
@@ -58,7 +59,7 @@ def _identity(settings: BenchmarkSettings) -> dict[str, Any]:
         hashlib.sha256(Path(settings.suite).read_bytes()).hexdigest()[:16] if settings.suite[-5:] == ".json" else ""
     )
     return {
-        "suite": settings.suite + (content and f" {content}"), "agent": settings.agent, "model": model,
+        "suite": settings.suite, "suite_content": content, "agent": settings.agent, "model": model,
         "cap": None if settings.signs else settings.cap, "preset": settings.preset,
         "time_limit": settings.time_limit, "seed": settings.seed, "code": code_version(),
     }  # fmt: skip
@@ -68,7 +69,8 @@ def _claim(settings: BenchmarkSettings) -> None:
     """Writes down whose results a folder holds. Raises ValueError where they are another's."""
     path, wanted = settings.out / RUN, _identity(settings)
     if not path.is_file():
-        write_whole(path, (json.dumps(wanted, indent=2) + "\n").encode())
+        file = {"model_file": str(settings.model.resolve()) if settings.model else None}
+        write_whole(path, (json.dumps(wanted | file, indent=2) + "\n").encode())
         return
     try:
         found = dict(json.loads(path.read_text()))
@@ -107,15 +109,17 @@ def _set_up(driver: DriverSettings) -> Any:
     return set_up(driver)
 
 
-def drive_trial(driver: DriverSettings, trial: Trial) -> dict[str, Any]:
-    """Drives one trial; returns its line."""
+def drive_trial(driver: DriverSettings, folder: Path, trial: Trial) -> dict[str, Any]:
+    """Drives one trial; leaves its trace and stills in a folder and returns its line."""
     world, agent = _set_up(driver)
-    behaviour = Behaviour(world.dt)
+    behaviour, witness = Behaviour(world.dt), Witness(world, trial.scenario)
 
     def watch(step: Step) -> None:
         behaviour.add(step)
+        witness.add(step)
 
     result = run_episode(world, agent, trial.scenario, watch, trial.fatal)
+    witness.write(folder, trial.key, result)
     figures = behaviour.figures(result.infractions)
     return {"key": trial.key, "result": result_values(result), "figures": {k: plain(v) for k, v in figures.items()}}
 
@@ -147,7 +151,7 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     known = read_lines(path)
     missing = [trial for trial in trials if trial.key not in known]
     done = len(trials) - len(missing)
-    for _, line in spread(partial(drive_trial, driver), missing, settings.workers):
+    for _, line in spread(partial(drive_trial, driver, settings.out), missing, settings.workers):
         _append(path, line)
         done += 1
         yield done, len(trials), line["result"]["outcome"] == "success"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -47,16 +48,24 @@ def _papers(metric: str) -> float:
     return PAPER[metric] if metric in PAPER else PAPER[f"{metric}_scaled"] * SCALES[metric]
 
 
+def _scaled(metric: str, figures: Mapping[str, float]) -> str:
+    """A continuous affordance's figure in units of its scale, as the supplement prints it."""
+    return f"{figures[metric] / SCALES[metric]:.3g}" if metric.endswith("/mae") else ""
+
+
 def evaluation_table(found: Report) -> Group:
     """Mean IoU and MAE over all frames, as the paper has them, and by command, weather and town; confusions."""
+    paper = {name: _papers(name) for name, _ in FIGURES.values()}
     table = Table("", *FIGURES, box=SIMPLE_HEAD)
     rows = {
         f"all {found.frames} frames": found.overall,
-        "the paper, in CARLA": {name: _papers(name) for name, _ in FIGURES.values()},
+        "the paper, in CARLA": paper,
     }
     rows |= {f"{kind} {value}": figures for kind, values in found.groups.items() for value, figures in values.items()}
     for name, figures in rows.items():
         table.add_row(name, *(f"{factor * figures[metric]:.3g}" for metric, factor in FIGURES.values()))
+    for name, figures in (("all, scaled", found.overall), ("the paper, scaled", paper)):
+        table.add_row(name, *(_scaled(metric, figures) for metric, _ in FIGURES.values()))
     return Group(table, *(_confusion(n, c) for n, c in found.confusion.items()))
 
 

@@ -1,0 +1,53 @@
+"""Keeps what the report shows of an episode: its trace, and a still of each infraction and of a failed end."""
+
+from __future__ import annotations
+
+import gzip
+from dataclasses import replace
+from pathlib import Path
+
+import simplejpeg
+
+from caldrive.config import CameraConfig
+from caldrive.datatypes import Image, Scenario, Step
+from caldrive.driving.referee import Referee
+from caldrive.driving.trace import Trace, episode_json
+from caldrive.files import write_whole
+from caldrive.results import EpisodeResult, Outcome
+from caldrive.world.embedded import EmbeddedWorld
+
+STILL = replace(CameraConfig(), width=480, height=212)
+MOST = 4  # stills of one episode; more would show the same once more
+
+
+def trace_path(folder: Path, key: str) -> Path:
+    return folder / "traces" / f"{key}.json.gz"
+
+
+def still_paths(folder: Path, key: str) -> list[Path]:
+    """The stills that an episode left, in the order of its infractions; the last one may be its end."""
+    return sorted((folder / "stills").glob(f"{key}-[0-9].jpg"))
+
+
+class Witness:
+    """Watches one episode in a world."""
+
+    def __init__(self, world: EmbeddedWorld, scenario: Scenario) -> None:
+        self.world, self.trace, self.stills = world, Trace(), list[Image]()
+        self._referee = Referee(scenario)
+
+    def add(self, step: Step) -> None:
+        """One more step."""
+        self.trace.add(step)
+        before = len(self._referee.infractions)
+        self._referee.watch(step.truth)
+        if len(self._referee.infractions) > before and len(self.stills) < MOST:
+            self.stills += self.world.images([STILL])
+
+    def write(self, folder: Path, key: str, result: EpisodeResult) -> None:
+        """Trace and stills into a folder."""
+        if result.outcome is not Outcome.SUCCESS and len(self.stills) < MOST:
+            self.stills += self.world.images([STILL])
+        write_whole(trace_path(folder, key), gzip.compress(episode_json(result, self.trace), mtime=0))
+        for k, still in enumerate(self.stills):
+            write_whole(folder / "stills" / f"{key}-{k}.jpg", simplejpeg.encode_jpeg(still, 85, colorspace="RGB"))
