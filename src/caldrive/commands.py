@@ -102,6 +102,30 @@ class Replay(Output):
         return Answer(values, f"{said}; {same}", int(not found.same))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Report(Output):
+    folders: tyro.conf.Positional[tuple[Path, ...]]
+    """Benchmarks' folders, side by side in the report."""
+    out: Path = Path("out/report")
+    """Folder for report.md and report.html."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.outputs import require_writable_folder
+        from caldrive.driving.report import failures, load_runs, report_text
+        from caldrive.driving.report_page import report_page
+        from caldrive.files import write_whole
+
+        if not self.folders:
+            raise ValueError("found no folder, wanted a benchmark's: type caldrive report out/benchmark")
+        runs = load_runs(self.folders)
+        require_writable_folder(self.out)
+        progress("writing", 0.2)
+        write_whole(self.out / "report.md", report_text(runs).encode())
+        write_whole(self.out / "report.html", report_page(runs).encode())
+        values = {"out": str(self.out), "runs": [run.name for run in runs], "failures": len(failures(runs))}
+        return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")
+
+
 @dataclass(frozen=True)
 class Town(Output):
     town: str = "town01"
@@ -239,6 +263,7 @@ Command = (
     Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
     | Annotated[Benchmark, subcommand("benchmark", description="Drive a whole suite, and count.")]
     | Annotated[Replay, subcommand("replay", description="Drive a benchmark's episode again, and film it.")]
+    | Annotated[Report, subcommand("report", description="Tables and a page on one or more benchmarks.")]
     | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
     | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
     | Annotated[Data, subcommand("data", description="Check and describe a recording.")]

@@ -9,8 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -50,6 +52,13 @@ def code_version() -> str:
     return digest.hexdigest()[:16]
 
 
+def _machine() -> str:
+    """The processor in words, and how many cores it has."""
+    info = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").is_file() else ""
+    names = [line.partition(":")[2].strip() for line in info.splitlines() if line.startswith("model name")]
+    return f"{names[0] if names else platform.processor() or platform.machine()}, {os.cpu_count()} cores"
+
+
 def _identity(settings: BenchmarkSettings) -> dict[str, Any]:
     """What a folder's results depend on."""
     model = None
@@ -69,7 +78,11 @@ def _claim(settings: BenchmarkSettings) -> None:
     """Writes down whose results a folder holds. Raises ValueError where they are another's."""
     path, wanted = settings.out / RUN, _identity(settings)
     if not path.is_file():
-        file = {"model_file": str(settings.model.resolve()) if settings.model else None}
+        file = {
+            "model_file": str(settings.model.resolve()) if settings.model else None,
+            "began": datetime.now(UTC).isoformat(timespec="seconds"),
+            "machine": _machine(), "workers": settings.workers,
+        }  # fmt: skip
         write_whole(path, (json.dumps(wanted | file, indent=2) + "\n").encode())
         return
     try:
@@ -81,6 +94,19 @@ def _claim(settings: BenchmarkSettings) -> None:
             raise ValueError(
                 f"found in {settings.out} results with {name} {found.get(name)}, wanted {value}: give another --out"
             )
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """What drove the results in a folder. Raises ValueError where there are none."""
+    path = folder / RUN
+    if not path.is_file():
+        raise ValueError(f"found no {RUN} in {folder}, wanted a benchmark's folder: type caldrive benchmark --out DIR")
+    try:
+        return dict(json.loads(path.read_text()))
+    except (ValueError, TypeError) as error:
+        raise ValueError(
+            f"found that {path} is damaged, wanted a run's description: run the benchmark again"
+        ) from error
 
 
 def read_lines(path: Path) -> dict[str, dict[str, Any]]:

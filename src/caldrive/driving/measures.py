@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from statistics import median
 
+from caldrive.driving.behaviour import CONTINUOUS, DISCRETE
 from caldrive.driving.benchmark import Driven
 from caldrive.results import InfractionKind, Outcome
 
 Z95 = 1.959964  # of a normal distribution, two-sided
-# Published success rates in percent: straight, one turn, navigation, navigation dynamic (table 1).
-PAPER_SUCCESS = {
-    "MP": {"training": (98, 82, 80, 77), "new weather": (100, 95, 94, 89), "new town": (92, 61, 24, 24),
-           "new town + weather": (50, 50, 47, 44)},
-    "CIL": {"training": (95, 89, 86, 83), "new weather": (98, 90, 84, 82), "new town": (97, 59, 40, 38),
-            "new town + weather": (80, 48, 44, 42)},
-    "RL": {"training": (89, 34, 14, 7), "new weather": (86, 16, 2, 2), "new town": (74, 12, 3, 2),
-           "new town + weather": (68, 20, 6, 4)},
-    "CAL": {"training": (100, 97, 92, 83), "new weather": (100, 96, 90, 82), "new town": (93, 82, 70, 64),
-            "new town + weather": (94, 72, 68, 64)},
-}  # fmt: skip
 # Leaderboard 2.1: what an infraction adds to the denominator of the driving score.
 PENALTIES = {
     InfractionKind.COLLISION_PERSON: 1.0, InfractionKind.COLLISION_CAR: 0.7, InfractionKind.COLLISION_OBJECT: 0.6,
@@ -114,3 +105,44 @@ def rates(driven: Sequence[Driven]) -> list[Rate]:
     km = sum(one.result.distance for one in driven) / 1000
     broken = [infraction for one in driven for infraction in one.result.infractions if infraction.at_fault]
     return [Rate(kind, sum(one.kind is kind for one in broken), km) for kind in InfractionKind]
+
+
+def comfort(driven: Sequence[Driven]) -> dict[str, float]:
+    """Figures of supplement 3.2 over all episodes, each weighted by its time: median centre-line distance in m, RMS
+    jerks in m/s³, share of time within nuPlan's bounds."""
+    seconds = sum(one.figures["seconds"] for one in driven)
+    turning = sum(one.figures["turning"] for one in driven)
+
+    def rms(name: str, weight: Callable[[Driven], float], whole: float) -> float:
+        return math.sqrt(sum(weight(one) * one.figures[name] ** 2 for one in driven) / whole) if whole else 0.0
+
+    return {
+        "center_distance": median(one.figures["center_distance"] for one in driven) if driven else 0.0,
+        "jerk": rms("jerk", lambda one: float(one.figures["seconds"]), seconds),
+        "lateral_straight": rms(
+            "lateral_straight", lambda one: float(one.figures["seconds"] - one.figures["turning"]), seconds - turning
+        ),
+        "lateral_turn": rms("lateral_turn", lambda one: float(one.figures["turning"]), turning),
+        "comfortable": sum(one.figures["seconds"] * one.figures["comfortable"] for one in driven) / seconds
+        if seconds
+        else 1.0,
+    }
+
+
+def reds(driven: Sequence[Driven]) -> tuple[int, int]:
+    """Red lights met, and of these run."""
+    met = sum(int(one.figures["reds_met"]) for one in driven)
+    run = sum(i.kind is InfractionKind.RED_LIGHT for one in driven for i in one.result.infractions)
+    return max(met, run), run
+
+
+def errors(driven: Sequence[Driven]) -> dict[str, float]:
+    """What the affordances were off by while driving, weighted by time: shares of frames for the discrete ones, mean
+    absolute errors in SI units for the others."""
+    found: dict[str, float] = {}
+    for name in (*DISCRETE, "speed_sign", *CONTINUOUS):
+        known = [one for one in driven if one.figures.get(f"error/{name}") is not None]
+        weight = sum(one.figures["seconds"] for one in known)
+        if weight:
+            found[name] = sum(one.figures["seconds"] * one.figures[f"error/{name}"] for one in known) / weight
+    return found

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.datatypes import Step
-from caldrive.driving.benchmark import RESULTS, RUN, read_lines
+from caldrive.driving.benchmark import RESULTS, read_lines, read_run
 from caldrive.driving.drivers import set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.outputs import require_writable_file
@@ -30,18 +30,6 @@ class Replay:
     video: Path
 
 
-def _run(folder: Path) -> dict[str, Any]:
-    path = folder / RUN
-    if not path.is_file():
-        raise ValueError(f"found no {RUN} in {folder}, wanted a benchmark's folder: type caldrive benchmark --out DIR")
-    try:
-        return dict(json.loads(path.read_text()))
-    except (ValueError, TypeError) as error:
-        raise ValueError(
-            f"found that {path} is damaged, wanted a run's description: run the benchmark again"
-        ) from error
-
-
 def _trial(run: dict[str, Any], key: str) -> Trial:
     trials = suite(run["suite"], run["seed"], run["time_limit"])
     found = [trial for trial in trials if trial.key == key]
@@ -55,7 +43,7 @@ def replay(folder: Path, key: str, out: Path, progress: Progress = silent) -> Re
 
     Raises ValueError where there is no such run or episode.
     """
-    run = _run(folder)
+    run = read_run(folder)
     trial, known = _trial(run, key), read_lines(folder / RESULTS)
     require_writable_file(out, "--out")
     model = Path(run["model_file"]) if run["model_file"] else None

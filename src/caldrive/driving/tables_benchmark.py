@@ -10,13 +10,13 @@ from rich.table import Table
 from rich.text import Text
 
 from caldrive.driving.benchmark import Driven
-from caldrive.driving.measures import PAPER_SUCCESS, Cell, cells, rates
-from caldrive.driving.tasks import TASKS
+from caldrive.driving.measures import Cell, cells, rates
+from caldrive.driving.published import success
 
 
 def _published(cell: Cell) -> str:
-    found = PAPER_SUCCESS["CAL"].get(cell.condition)
-    return f"  paper {found[TASKS.index(cell.task)]}" if found and cell.task in TASKS else ""
+    found = success("CAL", cell.condition, cell.task)
+    return "" if found is None else f"  paper {found}"
 
 
 def _text(cell: Cell) -> Text:

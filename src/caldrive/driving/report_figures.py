@@ -1,0 +1,140 @@
+"""The report's pictures, as SVG: success beside the paper's, where infractions happened, errors over time, speed over
+distance."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from caldrive.config import KMH
+from caldrive.driving.measures import cells
+from caldrive.driving.published import SYSTEMS, success
+from caldrive.driving.report import Run
+from caldrive.driving.witness import trace_path
+from caldrive.results import InfractionKind
+from caldrive.world.towns import load_town
+
+COLORS = ("#1f4e79", "#c8782d", "#4f8a4c", "#8a4c86", "#777777")
+MARKS = dict(zip(SYSTEMS, "xv^D", strict=True))
+KIND_COLORS = dict(zip(InfractionKind, ("#e0a100", "#8a4c86", "#d9534f", "#444444", "#1f77b4", "#e377c2"), strict=True))
+BIN = 5.0  # s
+SHOWN = ("relative_angle", "center_distance", "vehicle_distance")
+
+
+def svg(figure: Figure) -> str:
+    """A figure as text that depends on nothing but its content."""
+    buffer = io.StringIO()
+    with rc_context({"svg.hashsalt": "caldrive", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def success_figure(runs: Sequence[Run]) -> str:
+    """Success in each cell with its interval, and the paper's systems as marks."""
+    figure = Figure(figsize=(12, 4.2), layout="constrained")
+    ax = figure.subplots()
+    found = {(run.name, c.condition, c.task): c for run in runs for c in cells(run.driven)}
+    places = list(dict.fromkeys(key[1:] for key in found))
+    width = 0.8 / len(runs)
+    for k, run in enumerate(runs):
+        at = [(i + (k - (len(runs) - 1) / 2) * width, found.get((run.name, *p))) for i, p in enumerate(places)]
+        here = [(x, cell) for x, cell in at if cell is not None]
+        x, y = [x for x, _ in here], [cell.percent for _, cell in here]
+        spread = [[abs(c.percent - c.interval[side]) for _, c in here] for side in (0, 1)]
+        ax.bar(x, y, width * 0.92, color=COLORS[k % len(COLORS)], label=run.name, yerr=spread, ecolor="#222222")
+    for system, mark in MARKS.items():
+        known = [(i, success(system, *p)) for i, p in enumerate(places)]
+        known = [(i, v) for i, v in known if v is not None]
+        if known:
+            ax.plot(*zip(*known, strict=True), mark, color="black", ms=6, mfc="white", label=f"{system} (paper)", ls="")
+    ax.set_xticks(range(len(places)), [f"{task}\n{condition}" for condition, task in places], fontsize=6, rotation=45)
+    ax.set(ylabel="% reached in time", ylim=(0, 105))
+    figure.legend(loc="outside right upper", fontsize=8)
+    return svg(figure)
+
+
+def map_figure(runs: Sequence[Run], town: str) -> str:
+    """Where in a town infractions happened; others' faults are hollow."""
+    figure = Figure(figsize=(7, 6), layout="constrained")
+    ax = figure.subplots()
+    for lane in load_town(town).lanes.values():
+        ax.plot(*lane.line.points.T, color="#cccccc", lw=1.5, zorder=1)
+    marks = "os^Dv"
+    seen = set()
+    for k, run in enumerate(runs):
+        for one in run.driven:
+            for i in one.result.infractions if one.trial.scenario.town == town else ():
+                name = f"{run.name}: {i.kind.value}"
+                face = KIND_COLORS[i.kind] if i.at_fault else "none"
+                label = None if name in seen else name
+                seen.add(name)
+                ax.scatter(
+                    i.x, i.y, 26, facecolors=face, edgecolors=KIND_COLORS[i.kind], marker=marks[k % 5],
+                    label=label, zorder=2,
+                )  # fmt: skip
+    ax.set(aspect="equal", title=town, xlabel="m", ylabel="m")
+    if seen:
+        figure.legend(loc="outside right upper", fontsize=7)
+    return svg(figure)
+
+
+def traces(run: Run) -> Iterator[dict[str, list[Any]]]:
+    """The columns of all episodes whose traces lie in a run's folder."""
+    for one in run.driven:
+        path = trace_path(run.folder, one.trial.key)
+        if path.is_file():
+            yield json.loads(gzip.decompress(path.read_bytes()))["trace"]
+
+
+def errors_figure(runs: Sequence[Run]) -> str:
+    """Mean absolute error of the continuous affordances over the time since the start."""
+    figure = Figure(figsize=(12, 3.2), layout="constrained")
+    axes = figure.subplots(1, len(SHOWN))
+    for k, run in enumerate(runs):
+        columns = list(traces(run))
+        time = np.concatenate([c["time"] for c in columns]) if columns else np.zeros(0)
+        slot = (time // BIN).astype(int)
+        for ax, name in zip(axes, SHOWN, strict=True):
+            if not columns or f"predicted_{name}" not in columns[0]:
+                continue
+            seen, true = (
+                np.concatenate([np.array(c[f"{kind}_{name}"], dtype=float) for c in columns])
+                for kind in ("predicted", "true")
+            )
+            wrong = np.nan_to_num(np.abs(seen - true))
+            count = np.bincount(slot)
+            mean = np.bincount(slot, wrong) / np.maximum(count, 1)
+            enough = count > 50
+            ax.plot((np.arange(len(mean)) * BIN)[enough], mean[enough], color=COLORS[k % len(COLORS)], label=run.name)
+            ax.set(title=name.replace("_", " "), xlabel="s since the start", ylim=(0, None))
+    axes[0].legend(fontsize=8)
+    return svg(figure)
+
+
+def speed_figure(runs: Sequence[Run]) -> str:
+    """Speed over distance in the longest episode that all agents drove."""
+    keys = set.intersection(*({one.trial.key for one in run.driven} for run in runs))
+    longest = max(
+        (one for one in runs[0].driven if one.trial.key in keys), key=lambda one: one.result.route_length, default=None
+    )
+    figure = Figure(figsize=(12, 3.2), layout="constrained")
+    ax = figure.subplots()
+    for k, run in enumerate(runs):
+        path = trace_path(run.folder, longest.trial.key) if longest else run.folder / "none"
+        if longest is None or not path.is_file():
+            continue
+        columns = json.loads(gzip.decompress(path.read_bytes()))["trace"]
+        ax.plot(columns["route_done"], np.array(columns["speed"]) / KMH, color=COLORS[k % len(COLORS)], label=run.name)
+        if k == 0:
+            ax.step(columns["route_done"], columns["road_limit"], "k--", lw=1, where="post", label="limit on the signs")
+    ax.set(title=longest.trial.key if longest else "", xlabel="m along the route", ylabel="km/h", ylim=(0, None))
+    ax.legend(fontsize=8)
+    return svg(figure)
