@@ -1,63 +1,159 @@
-"""The figures of a network on recorded frames, by groups, with the frames that it gets most wrong."""
+"""The report: its figures as text, and the page in a real browser."""
 
 from __future__ import annotations
 
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-import torch
+import simplejpeg
 
-from caldrive.perception.dataset import Frames, find_episodes, held_out, split, summary
-from caldrive.perception.network import Network
-from caldrive.perception.report import APART, PAPER, errors, report, worst
-from caldrive.perception.specs import SPECS
-from tests.perception_data import HEIGHT, TINY, WIDTH, record
+from caldrive.driving.benchmark import Driven
+from caldrive.driving.report import Run, failures, load_run, report_text, tables
+from caldrive.driving.report_page import report_page
+from caldrive.driving.suites import suite
+from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+ABOUT: dict[str, Any] = {
+    "suite": "quick", "agent": "cal", "model": "abc", "cap": 20.0, "code": "123", "began": "2026-01-02T03:04:05+00:00",
+    "machine": "two cores",
+}  # fmt: skip
+FIGURES: dict[str, Any] = {
+    "seconds": 50.0, "turning": 10.0, "jerk": 0.4, "lateral_straight": 0.1, "lateral_turn": 0.2, "comfortable": 0.9,
+    "center_distance": 0.05, "reds_met": 3, "off_lane": 0.0, "error/hazard_stop": 0.01, "error/red_light": 0.0,
+    "error/speed_sign": 0.02, "error/vehicle_distance": 0.5, "error/relative_angle": 0.02,
+    "error/center_distance": 0.1, "before/0/relative_angle": 0.3, "before/0/hazard_stop": 0.5,
+}  # fmt: skip
+
+
+def run(name: str, folder: Path) -> Run:
+    """The quick suite, driven well but for every fifth episode."""
+    driven = []
+    for k, trial in enumerate(suite("quick")):
+        bad = k % 5 == 4
+        kind = InfractionKind.SIDEWALK if k % 2 else InfractionKind.RED_LIGHT
+        broken = (Infraction(kind, 12.5, 100.0, 90.0),) if bad else ()
+        outcome = Outcome.TIMEOUT if k % 10 == 4 else Outcome.SUCCESS
+        result = EpisodeResult(trial.scenario, outcome, 50.0, 250.0, 200.0, 250.0, broken)
+        driven.append(Driven(trial, result, FIGURES))
+    return Run(name, folder, ABOUT | {"agent": name}, tuple(driven))
 
 
 @pytest.fixture(scope="module")
-def frames(tmp_path_factory: pytest.TempPathFactory) -> Frames:
-    torch.set_num_threads(1)
-    return Frames(find_episodes(record(tmp_path_factory.mktemp("recording"))), (HEIGHT, WIDTH))
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+    made = [run(name, tmp_path_factory.mktemp(name)) for name in ("oracle", "cal")]
+    still = made[1].folder / "stills" / f"{made[1].driven[4].trial.key}-0.jpg"
+    still.parent.mkdir()
+    still.write_bytes(simplejpeg.encode_jpeg(np.full((20, 40, 3), 90, np.uint8)))
+    return made
 
 
-def test_every_frame_counts_once_in_the_confusions_and_in_each_kind_of_group(frames: Frames, tmp_path: Path) -> None:
-    found = report(Network(TINY), frames, tmp_path / "worst.png")
-    assert found.frames == len(frames)
-    assert all(sum(map(sum, table)) == found.frames for table in found.confusion.values())
-    assert set(found.groups) == {"command", "weather", "town"}
-    assert set(found.groups["town"]) == {"town01"}
-    assert found.groups["weather"]["1"] == pytest.approx(found.overall)
-    assert set(PAPER) <= set(found.overall)
-    assert (tmp_path / "worst.png").read_bytes().startswith(b"\x89PNG")
+def test_every_cell_stands_beside_the_papers(runs: list[Run]) -> None:
+    success = next(one for one in tables(runs) if one.title == "Success")
+    row = dict(zip(success.head, next(r for r in success.rows if r[:2] == ("new town", "navigation")), strict=True))
+    assert row["CAL (paper)"] == "70"
+    assert row["MP (paper)"] == "24"
+    assert "of 2" in row["cal %"]
+    assert len(success.rows) == 16
 
 
-def test_errors_are_in_si_units_or_the_belief_that_truth_did_not_get() -> None:
-    by_name = {spec.name: spec for spec in SPECS}
-    far = errors(
-        by_name["vehicle_distance"],
-        {"vehicle_distance": torch.tensor([[0.5]])},
-        {"vehicle_distance": torch.tensor([0.2])},
-    )
-    assert far == pytest.approx([15.0])
-    sure = {"red_light": torch.tensor([[0.0, 20.0], [0.0, 0.0]])}
-    assert errors(by_name["red_light"], sure, {"red_light": torch.tensor([0, 1])}) == pytest.approx([1.0, 0.5])
+def test_infractions_stand_beside_table_2(runs: list[Run]) -> None:
+    found = next(one for one in tables(runs) if one.title == "Infractions")
+    row = next(r for r in found.rows if r[:2] == ("new weather", "opposite lane"))
+    assert row[2].startswith("> ")
+    assert row[-1] == ">60"
 
 
-def test_the_worst_frames_are_not_neighbours() -> None:
-    ids = np.arange(200)
-    wrong = np.exp(-((ids - 100) ** 2) / 50.0)
-    chosen = worst(wrong, ids)
-    assert chosen[0] == 100
-    assert min(abs(a - b) for i, a in enumerate(chosen) for b in chosen[:i]) > APART
+def test_failures_say_what_was_wrong_before(runs: list[Run]) -> None:
+    found = failures(runs)
+    assert len(found) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].driven)))
+    assert found[0].before == ("relative angle 0.30 rad, hazard stop 50 %",)
 
 
-def test_held_out_episodes_are_those_of_the_training(frames: Frames, tmp_path: Path) -> None:
-    episodes = find_episodes(record(tmp_path))
-    learnt, kept = split(episodes, 0.05, seed=0)
-    size = HEIGHT, WIDTH
-    data = summary(Frames(learnt, size), Frames(kept, size))
-    assert held_out(episodes, data) == kept
-    for known in ({}, data | {"validation_episodes": ["another/town01/1/7"]}):
-        with pytest.raises(ValueError, match="leave --held-out away"):
-            held_out(episodes, known)
+def test_the_text_holds_all_tables_and_failures(runs: list[Run]) -> None:
+    text = report_text(runs)
+    for table in tables(runs):
+        assert f"## {table.title}" in text
+    assert text.count("| cal | town0") == len(failures(runs)) // 2
+    assert "caldrive benchmark --suite quick --agent cal --cap 20" in text
+
+
+def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"no run\.json"):
+        load_run(tmp_path)
+
+
+def test_two_runs_write_the_same_page(runs: list[Run]) -> None:
+    assert report_page(runs) == report_page(runs)
+
+
+def test_what_comes_from_files_is_text_and_no_markup(runs: list[Run]) -> None:
+    evil = replace(runs[0], name="<script>alert(1)</script>")
+    assert "<script>alert" not in report_page([evil])
+
+
+@pytest.fixture(scope="module")
+def page(runs: list[Run], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(report_page(runs))
+    with sync_playwright() as browsers:
+        browser = browsers.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        opened: Any = browser.new_page()
+        opened.asked, opened.complaints = [], []
+        opened.on("request", lambda request: opened.asked.append(request.url))
+        opened.on("pageerror", lambda error: opened.complaints.append(str(error)))
+        opened.goto(path.as_uri())
+        yield opened
+        browser.close()
+
+
+def column(page: Any, table: int, head: str) -> list[str]:
+    found = page.locator("table").nth(table)
+    heads = found.locator("th").all_inner_texts()
+    at = next(i for i, text in enumerate(heads) if text.startswith(head))
+    return [row.locator("td").nth(at).inner_text() for row in found.locator("tbody tr").all()]
+
+
+def test_the_page_opens_with_its_tables_plots_and_stills(page: Any) -> None:
+    heads = page.locator("h2").all_inner_texts()
+    assert {"Runs", "Success", "Infractions", "Driving behaviour", "Speed over distance", "Failures"} <= set(heads)
+    assert page.locator("svg").count() >= 5
+    assert page.locator("article img").count() == 1
+    assert page.evaluate("document.querySelector('article img').naturalWidth") == 40
+
+
+def test_nothing_is_fetched_from_outside(page: Any) -> None:
+    assert [url for url in page.asked if not url.startswith(("file:", "data:"))] == []
+    assert page.complaints == []
+
+
+def test_a_click_on_a_head_sorts_by_number_and_another_turns_it_round(page: Any) -> None:
+    head = page.locator("table").nth(1).locator("th", has_text=re.compile(r"^CAL \(paper\)"))
+    head.click()
+    up = [int(text) for text in column(page, 1, "CAL")]
+    assert up == sorted(up)
+    head.click()
+    assert [int(text) for text in column(page, 1, "CAL")] == sorted(up, reverse=True)
+
+
+def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[Run]) -> None:
+    page.select_option("select[data-filter=run]", "cal")
+    page.select_option("select[data-filter=kind]", "sidewalk")
+    shown = page.locator("article:visible")
+    expected = [
+        one for one in failures(runs[1:]) if any(i.kind is InfractionKind.SIDEWALK for i in one.one.result.infractions)
+    ]
+    assert shown.count() == len(expected) > 0
+    assert page.locator("#shown").inner_text() == str(len(expected))
+    page.select_option("select[data-filter=run]", "")
+    assert shown.count() == 2 * len(expected)

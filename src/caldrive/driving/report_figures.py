@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from caldrive.config import KMH
@@ -86,6 +87,11 @@ def map_figure(runs: Sequence[Run], town: str) -> str:
     return svg(figure)
 
 
+def _legend(ax: Axes) -> None:
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize=8)
+
+
 def traces(run: Run) -> Iterator[dict[str, list[Any]]]:
     """The columns of all episodes whose traces lie in a run's folder."""
     for one in run.driven:
@@ -114,8 +120,10 @@ def errors_figure(runs: Sequence[Run]) -> str:
             mean = np.bincount(slot, wrong) / np.maximum(count, 1)
             enough = count > 50
             ax.plot((np.arange(len(mean)) * BIN)[enough], mean[enough], color=COLORS[k % len(COLORS)], label=run.name)
-            ax.set(title=name.replace("_", " "), xlabel="s since the start", ylim=(0, None))
-    axes[0].legend(fontsize=8)
+            ax.set(title=name.replace("_", " "), xlabel="s since the start")
+    for ax in axes:
+        ax.set_ylim(bottom=0)
+    _legend(axes[0])
     return svg(figure)
 
 
@@ -136,5 +144,5 @@ def speed_figure(runs: Sequence[Run]) -> str:
         if k == 0:
             ax.step(columns["route_done"], columns["road_limit"], "k--", lw=1, where="post", label="limit on the signs")
     ax.set(title=longest.trial.key if longest else "", xlabel="m along the route", ylabel="km/h", ylim=(0, None))
-    ax.legend(fontsize=8)
+    _legend(ax)
     return svg(figure)
