@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -50,3 +52,35 @@ def test_workers_that_always_die_are_given_up() -> None:
 def test_an_error_in_the_work_ends_it(workers: int) -> None:
     with pytest.raises(ValueError, match="found 0"):
         list(spread(_fails, [0], workers))
+
+
+def _sleeps(folder: Path, k: int) -> int:
+    (folder / f"{os.getpid()}").touch()
+    time.sleep(60)
+    return k
+
+
+def _lives(pid: int) -> bool:
+    try:
+        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+
+
+def test_workers_end_with_the_process_that_they_work_for(tmp_path: Path) -> None:
+    parent = get_context("spawn").Process(target=_spread_sleepers, args=(tmp_path,))
+    parent.start()
+    until = time.monotonic() + 20
+    while len(workers := [int(path.name) for path in tmp_path.iterdir()]) < 2 and time.monotonic() < until:
+        time.sleep(0.05)
+    assert all(map(_lives, workers))
+    assert len(workers) == 2
+    parent.kill()
+    parent.join()
+    while any(map(_lives, workers)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(map(_lives, workers))
+
+
+def _spread_sleepers(folder: Path) -> None:
+    list(spread(partial(_sleeps, folder), range(2), 2))

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
 MOST_DEATHS = 3  # of workers, one after the other, while nothing gets done
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for work forever, and keep its memory."""
+    parent = parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def spread(work: Callable[[T], R], items: Sequence[T], workers: int) -> Iterator[tuple[T, R]]:
@@ -26,7 +40,8 @@ def spread(work: Callable[[T], R], items: Sequence[T], workers: int) -> Iterator
     while left:
         before = len(left)
         try:
-            with ProcessPoolExecutor(min(workers, len(left)), mp_context=get_context("spawn")) as pool:
+            count = min(workers, len(left))
+            with ProcessPoolExecutor(count, get_context("spawn"), initializer=_end_with_parent) as pool:
                 jobs = {pool.submit(work, items[k]): k for k in left}
                 for job in as_completed(jobs):
                     result = job.result()
