@@ -25,7 +25,7 @@ lint: $(READY)
 model: $(READY)
 	@mkdir -p $(MODEL)
 	@step() { echo "$$(date +%FT%T) caldrive $$*" | tee -a $(MODEL)/log.txt; $(BIN)/caldrive "$$@" | tee -a $(MODEL)/log.txt; }; \
-	step collect --out $(MODEL)/recording; \
+	step collect --out $(MODEL)/recording --semantic; \
 	step data $(MODEL)/recording --picture $(MODEL)/recording.png; \
 	step train --data $(MODEL)/recording --out $(MODEL)/training; \
 	step evaluate --data $(MODEL)/recording --model $(MODEL)/training/model.safetensors --held-out --worst $(MODEL)/worst.png; \

@@ -19,7 +19,7 @@ from pathlib import Path
 
 def start(out: Path, arguments: list[str]) -> subprocess.Popen[bytes]:
     """A benchmark in a process group of its own, so that its workers die with it."""
-    command = [sys.executable, "-m", "caldrive.cli", "benchmark", "--out", str(out), *arguments]
+    command = [sys.executable, "-m", "caldrive", "benchmark", "--out", str(out), *arguments]
     return subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
 
 

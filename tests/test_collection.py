@@ -27,7 +27,7 @@ from caldrive.world.semantics import Semantic
 from caldrive.world.towns import load_town
 from caldrive.world.traffic import stop_sumo
 
-TINY = CollectConfig("town02", (1, 6), episodes=3, duration=2.0, cars=3, people=10, width=48, height=24, seed=4)
+TINY = CollectConfig("town02", (1, 6), episodes=3, duration=2.0, cars=6, people=10, width=48, height=24, seed=4)
 
 
 @pytest.fixture(autouse=True)
@@ -289,3 +289,22 @@ def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
     monkeypatch.setattr(collection, "_record", _dies_once)
     list(collect(TINY, tmp_path, workers=2))
     assert contents(tmp_path) == contents(unbroken)
+
+
+def test_some_episodes_begin_beside_their_lane_and_come_back(tmp_path: Path) -> None:
+    aside = replace(TINY, episodes=1, duration=9.0, cars=0, people=0, displaced=1.0, before_turns=0.0)
+    list(collect(aside, tmp_path))
+    columns = read_episode(episode_path(tmp_path, 0)).columns
+    center = np.abs(columns["center_distance"][columns["camera"] == 1])
+    assert center[0] > 0.3
+    assert center[-1] < 0.3 * center[0]
+
+
+def test_other_houses_stand_along_the_same_streets(tmp_path: Path) -> None:
+    same, other = (replace(TINY, episodes=1, rearranged=share) for share in (0.0, 1.0))
+    for config, name in ((same, "same"), (other, "other")):
+        list(collect(config, tmp_path / name))
+    a, b = (read_episode(episode_path(tmp_path / name, 0)) for name in ("same", "other"))
+    assert a.scenario == b.scenario
+    assert (a.columns["relative_angle"] == b.columns["relative_angle"]).all()
+    assert np.abs(a.image(0).astype(int) - b.image(0)).mean() > 3

@@ -7,7 +7,7 @@ from torch import Generator, Tensor
 
 from caldrive.perception.images import DEVIATION, MEAN, Augmentation, augment, normalise, to_float
 
-OFF = Augmentation(color=0, contrast=0, brightness=0, blur=0, noise=0, share=1, rare_share=1)
+OFF = Augmentation(color=0, saturation=0, contrast=0, brightness=0, blur=0, noise=0, share=1, rare_share=1)
 
 
 def batch(n: int = 6) -> Tensor:
@@ -46,6 +46,15 @@ def test_light_changes_a_frame_by_one_gain_and_shift_for_each_channel(name: str)
     x, y = batch()[0, 1].flatten(), found[0, 1].flatten()
     assert not torch.equal(x, y)
     assert torch.corrcoef(torch.stack((x, y)))[0, 1] > 0.9999
+
+
+def test_saturation_moves_colours_to_and_from_grey_and_keeps_it() -> None:
+    found = augmented(Augmentation(**(vars(OFF) | {"saturation": 0.5})))
+    before, after = (x - x.mean(dim=1, keepdim=True) for x in (batch(), found))
+    strength = (after.flatten(1).norm(dim=1) / before.flatten(1).norm(dim=1)).tolist()
+    assert min(strength) < 0.9
+    assert max(strength) > 1.1
+    torch.testing.assert_close(found.mean(dim=1), batch().mean(dim=1), atol=0.06, rtol=0)
 
 
 def test_blur_smooths_and_keeps_the_mean() -> None:

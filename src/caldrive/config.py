@@ -110,20 +110,25 @@ class ControlConfig:
 
 @dataclass(frozen=True)
 class CollectConfig:
-    """What to record. duration: s of an episode. crossing: how much more people cross than usual.
-    before_signs, before_turns: shares of all episodes that begin before a sign, and before a turn at a junction.
-    hidden_cars: share of all episodes whose driver is told of no car ahead. semantic: a semantic image of each frame.
+    """What to record. duration: s of an episode. cars: in half of the episodes; the others have a third of them.
+    crossing: how much more people cross than usual.
+
+    Shares of the episodes: before_signs, before_turns begin before a sign, and before a turn at a junction; displaced
+    begin beside their lane; rearranged have other houses and trees along the streets; hidden_cars have a driver who is
+    told of no car ahead. semantic: a semantic image of each frame.
     """
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 3, 6, 8)
-    episodes: int = 340
+    episodes: int = 440
     duration: float = 30.0
-    cars: int = 40
+    cars: int = 75
     people: int = 70
     crossing: float = 3.0
     before_signs: float = 0.4
     before_turns: float = 0.4
+    displaced: float = 0.25
+    rearranged: float = 0.5
     hidden_cars: float = 0.1
     width: int = 200
     height: int = 88
@@ -197,7 +202,7 @@ class TrainingConfig:
     auto for a GPU where there is one.
     """
 
-    steps: int = 8000
+    steps: int = 10_000
     batch: int = 96
     window: int = 1
     learning_rate: float = 1e-3

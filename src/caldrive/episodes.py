@@ -1,7 +1,7 @@
 """A recorded episode on disk, the only home of the format: one Parquet file, one row for each frame of each camera.
 
-Images are JPEG bytes; a semantic image, where one was asked for, is a byte a pixel. The scenario, the episode's id and
-the version of the format lie as JSON in the schema's metadata.
+Images are JPEG bytes; a semantic image, where one was asked for, is a zipped byte a pixel. The scenario, the episode's
+id and the version of the format lie as JSON in the schema's metadata.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -96,7 +97,7 @@ def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
     jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
     named = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
     if frame.semantic is not None:
-        named[SEMANTIC.name] = frame.semantic.tobytes()
+        named[SEMANTIC.name] = zlib.compress(frame.semantic.tobytes(), 1)
     return named | plain | labels | driven | clean
 
 
@@ -149,7 +150,7 @@ class Episode:
 
     columns: episode, frame, camera, camera_left, camera_yaw, time, speed, command (the values of `Command`), the six
     labels (speed_sign is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera, then by
-    frame. semantics: a byte a pixel for each row, where they were recorded and asked for.
+    frame. semantics: a zipped byte a pixel for each row, where they were recorded and asked for.
     """
 
     path: Path
@@ -176,13 +177,15 @@ class Episode:
                 f"row {i} of {self.path} holds a damaged image: remove the file and record again"
             ) from error
 
-    def semantic(self, i: int) -> NDArray[np.uint8]:
-        """Row i's semantic image (H, W). Raises EpisodeError where there is none that fits its image."""
-        shape = self.image(i).shape[:2]
-        found = self.semantics[i] if self.semantics is not None else b""
-        if len(found) != shape[0] * shape[1]:
-            raise EpisodeError(f"row {i} of {self.path} has no semantic image of {shape}: record with --semantic")
-        return np.frombuffer(found, np.uint8).reshape(shape)
+    def semantic(self, i: int, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+        """Row i's semantic image (H, W); size: (H, W) where it is known. Raises EpisodeError where there is none that
+        fits."""
+        if self.semantics is None:
+            raise EpisodeError(f"{self.path} has no semantic images: record with --semantic")
+        try:
+            return np.frombuffer(zlib.decompress(self.semantics[i]), np.uint8).reshape(size or self.image(i).shape[:2])
+        except (zlib.error, ValueError) as error:
+            raise EpisodeError(f"row {i} of {self.path} holds a damaged semantic image: record again") from error
 
     def affordances(self, i: int) -> Affordances:
         """Row i's labels."""

@@ -32,6 +32,7 @@ from caldrive.world.weather import weather
 T = TypeVar("T")
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
+ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
 
@@ -143,13 +144,14 @@ def _set_up(
     world: EmbeddedWorld, config: CollectConfig, number: int, rng: np.random.Generator
 ) -> tuple[Scenario, CALAgent]:
     """A random start and random turns; returns the scenario and the driver."""
-    roads = world.enter(config.town)
+    roads = world.enter(config.town, 1 + number if rng.random() < config.rearranged else 0)
     start, turn = starting_place(roads, config.before_signs, config.before_turns, rng)
     route = random_route(roads, start, config.duration * 14 + 50, rng, turn)
     under = config.weathers[number % len(config.weathers)]
+    cars = config.cars if rng.random() < 0.5 else config.cars // 3
     seed = int(rng.integers(2**31))
     scenario = Scenario(
-        config.town, under, start, route.line.pose_at(route.length), config.cars, config.people, config.duration,
+        config.town, under, start, route.line.pose_at(route.length), cars, config.people, config.duration,
         seed, "collect", config.crossing,
     )  # fmt: skip
     cap = CAPS[int(rng.integers(len(CAPS)))]
@@ -157,6 +159,8 @@ def _set_up(
     oracle = (_HiddenCars if hidden else OraclePerception)(world.truth)
     agent = CALAgent(oracle, Controller(replace(ControlConfig(), cap=cap)))
     world.start(scenario, route)
+    if rng.random() < config.displaced:
+        world.displace(float(rng.uniform(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
     agent.reset()
     return scenario, agent
 

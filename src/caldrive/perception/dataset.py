@@ -34,10 +34,12 @@ STANDING = 0.25  # weight of a frame in which the car stands: it looks like the 
 
 @dataclass(frozen=True)
 class Batch:
-    """images (N, H, W, 3) in bytes, each frame once; index (B, T): where the windows find their frames among them;
-    group (N,): number of the first window that holds a frame; command (B, S); targets: (B * S,) by affordance."""
+    """images (N, H, W, 3) in bytes, each frame once; semantics (N, H, W), where the recording has them; index (B, T):
+    where the windows find their frames among them; group (N,): number of the first window that holds a frame; command
+    (B, S); targets: (B * S,) by affordance."""
 
     images: NDArray[np.uint8]
+    semantics: NDArray[np.uint8] | None
     index: Tensor
     group: Tensor
     command: Tensor
@@ -52,9 +54,12 @@ def episode_paths(folder: Path | str) -> list[Path]:
     return paths
 
 
-def find_episodes(folder: Path | str) -> list[Episode]:
-    """All episodes of a folder by name. Raises EpisodeError where there is none, or one is damaged."""
-    return [read_episode(path) for path in episode_paths(folder)]
+def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
+    """All episodes of a folder by name; semantic: with their semantic images, where they have them.
+
+    Raises EpisodeError where there is none, or one is damaged.
+    """
+    return [read_episode(path, semantic) for path in episode_paths(folder)]
 
 
 def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
@@ -119,6 +124,7 @@ class Frames:
         self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
         self.town = np.repeat([e.scenario.town for e in episodes], lengths)
         self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
+        self._semantic = all(e.semantics is not None for e in episodes)
         self._pool = ThreadPoolExecutor(2)
         self._cache: NDArray[np.uint8] | None = None
         if len(self) * size[0] * size[1] * 3 <= cache_gb * 1e9:
@@ -157,6 +163,13 @@ class Frames:
             slot[:] = image
         return images
 
+    def semantics(self, ids: Ids) -> NDArray[np.uint8] | None:
+        """Semantic images (N, H, W) of frames by number, where all episodes have them."""
+        if not self._semantic:
+            return None
+        chosen = (self._where[i] for i in ids.tolist())
+        return np.stack(list(self._pool.map(lambda where: where[0].semantic(where[1], self.size), chosen)))
+
     def batch(self, starts: Ids, window: int, context: int) -> Batch:
         """The windows whose first frames with a loss are `starts`; all of them must lie `window` frames before their
         stream's end.
@@ -169,6 +182,7 @@ class Frames:
         trained = ids[:, context:]  # (B, S)
         return Batch(
             images=self.images(unique),
+            semantics=self.semantics(unique),
             index=torch.from_numpy(inverse.reshape(ids.shape)),
             group=torch.from_numpy(first // ids.shape[1]),
             command=torch.from_numpy(self.command[trained]),

@@ -17,15 +17,16 @@ DEVIATION = (0.229, 0.224, 0.225)
 class Augmentation:
     """Strengths, and the share of the groups of frames to which each is applied.
 
-    color, contrast: largest change of a factor. brightness: largest shift, share of full brightness. blur: largest
-    deviation in pixels. noise: largest share of pixels turned to salt or pepper.
+    color, saturation, contrast: largest change of a factor. brightness: largest shift, share of full brightness. blur:
+    largest deviation in pixels. noise: largest share of pixels turned to salt or pepper.
     """
 
     share: float = 0.5
     rare_share: float = 0.2
-    color: float = 0.15
+    color: float = 0.25
+    saturation: float = 0.8
     contrast: float = 0.4
-    brightness: float = 0.2
+    brightness: float = 0.25
     blur: float = 1.2
     noise: float = 0.03
 
@@ -60,15 +61,19 @@ def _uniform(n: int, limit: float, share: float, generator: Generator) -> Tensor
 
 
 def _light(images: Tensor, groups: Tensor, config: Augmentation, generator: Generator) -> Tensor:
-    """Colour, contrast and brightness as one gain and one shift for each frame and channel."""
+    """Colour, saturation, contrast and brightness as one matrix and one shift for each frame."""
     n = int(groups.max()) + 1
     color = torch.stack([1 + _uniform(n, config.color, config.share, generator) for _ in range(3)], dim=1)
+    saturation = 1 + _uniform(n, config.saturation, config.share, generator)[:, None, None]
     contrast = 1 + _uniform(n, config.contrast, config.share, generator)
     brightness = _uniform(n, config.brightness, config.share, generator)
     middle = images[:, :, ::4, ::4].mean(dim=(1, 2, 3))  # every fourth pixel will do
-    gain = (color * contrast[:, None])[groups]  # (N, 3)
+    mixed = saturation * torch.eye(3) + (1 - saturation) / 3  # each colour drawn towards or away from the pixel's grey
+    matrix = (mixed * (color * contrast[:, None])[:, None])[groups]  # (N, 3, 3), from columns to columns
     shift = brightness[groups] + (1 - contrast[groups]) * middle
-    return _affine(images, gain, shift[:, None].expand(-1, 3)).clamp_(0, 1)
+    pixels = images.permute(0, 2, 3, 1).view(len(images), -1, 3)
+    made = torch.baddbmm(shift[:, None, None].expand(-1, 1, 3), pixels, matrix).clamp_(0, 1)
+    return made.view(len(images), *images.shape[2:], 3).permute(0, 3, 1, 2)
 
 
 def _smeared(rows: Tensor, dim: int, stride: int, taps: Tensor) -> Tensor:
@@ -108,7 +113,7 @@ def _salt_and_pepper(images: Tensor, groups: Tensor, config: Augmentation, gener
 def augment(
     images: Tensor, generator: Generator, groups: Tensor | None = None, config: Augmentation | None = None
 ) -> Tensor:
-    """Change colour, contrast, brightness and sharpness and add salt and pepper, in place.
+    """Change colour, saturation, contrast, brightness and sharpness and add salt and pepper, in place.
 
     images (N, 3, H, W): as from `to_float`, in [0, 1] and on the CPU.
     groups (N,): frames of one number (from 0) change alike, so that no sequence flickers; default: each by itself.

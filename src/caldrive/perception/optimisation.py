@@ -14,10 +14,11 @@ from torch.optim import Adam
 
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
-from caldrive.perception.dataset import Sampler
+from caldrive.perception.dataset import Batch, Sampler
 from caldrive.perception.evaluation import autocast
 from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.network import Network
+from caldrive.perception.repaint import repaint
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
 
@@ -68,8 +69,7 @@ class Run:
         torch.manual_seed(seed)  # dropout
         starts = self.sampler.draw(self.step, config.batch)[team.rank :: team.size]
         batch = self.sampler.frames.batch(starts, config.window, self.network.span - 1)
-        images = to_float(batch.images)
-        images = normalise(augment(images, generator, batch.group) if config.augment else images)
+        images = normalise(self._augmented(batch, generator))
         targets = {name: target.to(team.device) for name, target in batch.targets.items()}
         for group in self.optimizer.param_groups:
             group["lr"] = learning_rate(self.step, config)
@@ -83,6 +83,15 @@ class Run:
         self.optimizer.step()
         self.step += 1
         return float(total.detach())
+
+    def _augmented(self, batch: Batch, generator: torch.Generator) -> Tensor:
+        """A batch's images (N, 3, H, W), augmented where that is wanted, and painted anew where it is known how."""
+        images = to_float(batch.images)
+        if not self.config.augment:
+            return images
+        if batch.semantics is not None:
+            images = repaint(images, batch.semantics, batch.group, generator)
+        return augment(images, generator, batch.group)
 
     def save(self, path: Path) -> None:
         """Write all that the next step depends on."""

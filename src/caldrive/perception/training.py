@@ -100,7 +100,9 @@ def train(
     files, perception = Files(Path(out)), perception or PerceptionConfig()
     team = join(config.device, config.batch)
     size = (perception.image_height, perception.image_width)
-    train_episodes, held_episodes = split(find_episodes(data), config.validation_share, config.seed)
+    train_episodes, held_episodes = split(
+        find_episodes(data, semantic=config.augment), config.validation_share, config.seed
+    )
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
     run = start(config, perception, frames, imagenet, team)
     if files.state.is_file():

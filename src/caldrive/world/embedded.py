@@ -51,7 +51,7 @@ class EmbeddedWorld:
 
     def __init__(self, camera: CameraConfig | None = None, vehicle: VehicleConfig | None = None) -> None:
         self.mount, self.vehicle = camera, vehicle or VehicleConfig()
-        self._town: str | None = None
+        self._town: tuple[str, int] | None = None
         self._camera: Camera | None = None
 
     def reset(self, scenario: Scenario) -> Observation:
@@ -106,11 +106,19 @@ class EmbeddedWorld:
     def ego(self) -> VehicleState:
         return VehicleState(self.ego_state.pose, self.ego_state.speed, self.vehicle.length, self.vehicle.width, "ego")
 
-    def enter(self, town: str) -> RoadNetwork:
-        """Loads a town, if it is not the one already there, without starting an episode."""
-        if town != self._town:
-            self._load(town)
+    def enter(self, town: str, arrangement: int = 0) -> RoadNetwork:
+        """Loads a town, if it is not the one already there, without starting an episode.
+
+        arrangement: of its houses and trees, 0 for the town as it is.
+        """
+        if self._town != (town, arrangement):
+            self._load(town, arrangement)
         return self.roads
+
+    def displace(self, left: float, turn: float) -> Observation:
+        """Puts the ego some metres to the left and turns it (rad)."""
+        self.ego_state = replace(self.ego_state, pose=moved(self.ego_state.pose, left=left, turn=turn))
+        return self._observe()
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
         """What cameras on the ego see now, (H, W, 3) each."""
@@ -132,9 +140,9 @@ class EmbeddedWorld:
         ego = self.ego
         return self._label(replace(ego, pose=moved(ego.pose, left=left, turn=yaw)))
 
-    def _load(self, town: str) -> None:
+    def _load(self, town: str, arrangement: int) -> None:
         self.roads = load_town(town)
-        self.scenery = build_scenery(self.roads)
+        self.scenery = build_scenery(self.roads, arrangement)
         self.surface = Surface(self.roads)
         solid = [prop for prop in self.scenery if prop.solid]
         self._solid = [
@@ -146,7 +154,7 @@ class EmbeddedWorld:
         if self._camera is not None:
             self._camera.close()
             self._camera = None
-        self._town = town
+        self._town = town, arrangement
 
     def _touch(self) -> None:
         """Finds contacts and lets them act on the ego."""

@@ -228,9 +228,12 @@ def _posts(roads: RoadNetwork) -> Iterator[Prop]:
         yield Prop("sign_post", sign.pose, 0.2, 0.2, 2.5, label=sign.limit)
 
 
-def build_scenery(roads: RoadNetwork) -> tuple[Prop, ...]:
-    """All props of a town: posts first, then buildings, trees and furniture."""
-    rng = np.random.default_rng(zlib.crc32(roads.name.encode()))
+def build_scenery(roads: RoadNetwork, arrangement: int = 0) -> tuple[Prop, ...]:
+    """All props of a town: posts first, then buildings, trees and furniture.
+
+    arrangement: 0 is the town as it is; others have the same streets and posts among other houses and trees.
+    """
+    rng = np.random.default_rng([zlib.crc32(roads.name.encode()), *([arrangement] if arrangement else [])])
     style = STYLES[roads.style]
     posts = tuple(_posts(roads))
     buildings = tuple(_buildings(roads, style, rng))

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import Generator, Tensor
+
+from caldrive.config import TrainingConfig
+from caldrive.episodes import EpisodeWriter
+from caldrive.perception.images import to_float
+from caldrive.perception.repaint import FREEDOM, Repaint, repaint
+from caldrive.perception.training import train
+from caldrive.world.semantics import Semantic
+from tests.perception_data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame
+
+ALL = Repaint(share=1.0, grain=0.0)
+
+
+def scene(n: int = 4) -> tuple[Tensor, np.ndarray]:
+    """Pictures whose rows of pixels are of one class each."""
+    rng = np.random.default_rng(0)
+    semantics = np.tile(np.arange(len(Semantic), dtype=np.uint8)[None, :, None], (n, 1, 9))
+    return to_float(rng.integers(60, 180, (n, len(Semantic), 9, 3), dtype=np.uint8)), semantics
+
+
+def painted(config: Repaint, groups: list[int], seed: int = 0) -> Tensor:
+    images, semantics = scene(len(groups))
+    return repaint(images, semantics, torch.tensor(groups), Generator().manual_seed(seed), config)
+
+
+def test_every_class_has_its_freedom() -> None:
+    assert len(FREEDOM) == len(Semantic)
+
+
+def test_lights_and_signs_keep_their_colours_and_houses_do_not() -> None:
+    change = (painted(ALL, [0, 1, 2, 3]) - scene()[0]).abs().mean(dim=(0, 1, 3))  # by row, which is the class
+    assert change[Semantic.LIGHT] == 0
+    assert change[Semantic.SIGN] == 0
+    assert change[Semantic.BUILDING] > 0.03
+    assert change[Semantic.SIDEWALK] > 0.03
+    assert 0 < change[Semantic.LINE] < 0.5 * change[Semantic.BUILDING]
+
+
+def test_a_class_changes_by_one_rule_throughout_a_picture() -> None:
+    plain = Repaint(share=1.0, grain=0.0, plain=0.0)
+    found, before = painted(plain, [0]), scene(1)[0]
+    factors = (found / before)[0, :, Semantic.ROAD]  # (3, W)
+    assert float(factors.std(dim=1).max()) < 1e-3
+
+
+def test_frames_of_one_window_are_painted_alike() -> None:
+    images, semantics = scene(1)
+    same = images.repeat(4, 1, 1, 1).contiguous(memory_format=torch.channels_last)
+    groups = torch.tensor([0, 0, 2, 2])
+    found = repaint(same, semantics.repeat(4, 0), groups, Generator().manual_seed(1), ALL)
+    assert torch.equal(found[0], found[1])
+    assert torch.equal(found[2], found[3])
+    assert not torch.equal(found[0], found[2])
+
+
+def test_a_share_of_the_pictures_stays_as_it_is() -> None:
+    images, _ = scene(200)
+    found = painted(Repaint(share=0.3), list(range(200)))
+    kept = (found == images).flatten(1).all(dim=1).float().mean()
+    assert float(kept) == pytest.approx(0.7, abs=0.12)
+    assert float(found.min()) >= 0
+    assert float(found.max()) <= 1
+
+
+def test_training_paints_where_the_recording_tells_how(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    for semantic in (False, True):
+        for episode in range(3):
+            with EpisodeWriter(tmp_path / str(semantic) / f"e{episode}.parquet", SCENARIO) as writer:
+                for index in range(12):
+                    frame = make_frame(index, 0.1, hazard=index % 3 == 0)
+                    classes = rng.integers(0, 8, (HEIGHT, WIDTH), dtype=np.uint8) if semantic else None
+                    writer.append(type(frame)(**{**vars(frame), "semantic": classes}))
+    config = TrainingConfig(steps=2, batch=4, warm_up=1, evaluate_every=9, precision="fp32", validation_share=0.3)
+    first, second = (
+        train(config, tmp_path / name, tmp_path / f"out{name}", TINY, progress=False) for name in ("False", "True")
+    )
+    assert first.read_bytes() != second.read_bytes()
