@@ -10,7 +10,7 @@ MODEL := out/model
 
 .PHONY: drive test lint model clean
 drive: $(READY)
-	$(BIN)/caldrive drive --town town02 --weather 14 --task navigation-dynamic --cap 20 --out out/drive $(ARGS)
+	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
 test: $(READY) lint
 	$(BIN)/pytest -n 2 $(ARGS)
