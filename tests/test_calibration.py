@@ -5,8 +5,10 @@ from pathlib import Path
 import torch
 
 from caldrive.perception.calibration import calibrated
-from caldrive.perception.dataset import Frames, Sampler, find_episodes
+from caldrive.perception.dataset import Frames
+from caldrive.perception.folders import find_episodes
 from caldrive.perception.network import Network
+from caldrive.perception.sampler import Sampler
 from caldrive.perception.specs import class_weights
 from tests.perception_data import HEIGHT, TINY, WIDTH, record
 

@@ -7,24 +7,19 @@ import os
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from caldrive.config import CollectConfig
-from caldrive.datatypes import Command, Control
+from caldrive.datatypes import Control
 from caldrive.driving import collection
-from caldrive.driving.collection import BASELINES, Disturbance, _record, collect, episode_path, starting_place
+from caldrive.driving.collection import BASELINES, _record, collect, episode_path
 from caldrive.episodes import Episode, EpisodeError, read_episode
 from caldrive.world.embedded import EmbeddedWorld
-from caldrive.world.route import random_route
 from caldrive.world.semantics import Semantic
-from caldrive.world.towns import load_town
 from caldrive.world.traffic import stop_sumo
 
 TINY = CollectConfig("town02", (1, 6), episodes=3, duration=2.0, cars=6, people=10, width=48, height=24, seed=4)
@@ -177,90 +172,6 @@ def test_episodes_of_unknown_origin_are_not_added_to(tmp_path: Path) -> None:
     (tmp_path / "episode-00000.parquet").write_bytes(b"")
     with pytest.raises(ValueError, match="says how they came"):
         next(collect(TINY, tmp_path))
-
-
-controls = st.builds(
-    lambda effort, steer: Control(max(effort, 0.0), max(-effort, 0.0), steer), st.floats(-1, 1), st.floats(-1, 1)
-)
-
-
-@given(st.integers(0, 2**32), st.lists(st.tuples(controls, st.floats(0, 25)), min_size=1, max_size=60))
-def test_a_disturbance_is_bounded_and_ends(seed: int, drive: list[tuple[Control, float]]) -> None:
-    disturbance, before, slowest = Disturbance(np.random.default_rng(seed)), [0.0], 25.0
-    for control, speed in drive:
-        pushed = disturbance.apply(control, speed)  # a Control checks its own ranges
-        before.append(control.steer)
-        slowest = min(slowest, max(speed, 2.0))  # a push is as strong as the speed at its beginning allows
-        assert abs(pushed.steer - control.steer) <= min(1.0, 36 / slowest**2) + 1e-9 or pushed.steer in before
-        assert abs((pushed.throttle - pushed.brake) - (control.throttle - control.brake)) <= 0.5 + 1e-9
-
-
-def pushes(speed: float, seed: int = 0, steps: int = 20_000, control: Control | None = None) -> list[Control]:
-    disturbance, control = Disturbance(np.random.default_rng(seed)), control or Control(throttle=0.4)
-    return [disturbance.apply(control, speed) for _ in range(steps)]
-
-
-def test_disturbances_are_short_and_leave_most_of_the_drive_alone() -> None:
-    disturbed = [one != Control(throttle=0.4) for one in pushes(5.0)]
-    assert 0.03 < np.mean(disturbed) < 0.3
-    assert max(len(list(run)) for pushed, run in groupby(disturbed) if pushed) < 19
-
-
-def test_a_slow_car_is_not_disturbed() -> None:
-    assert set(pushes(1.0, steps=3000)) == {Control(throttle=0.4)}
-
-
-def test_the_push_at_the_wheel_goes_to_both_sides_and_weakens_with_speed() -> None:
-    slow, fast = (np.array([one.steer for one in pushes(speed)]) for speed in (5.0, 20.0))
-    assert slow.max() > 0.25
-    assert slow.min() < -0.25
-    assert np.abs(fast).max() <= (6 / 20) ** 2 + 1e-9
-
-
-def test_a_hard_braking_car_is_left_to_brake() -> None:
-    assert {(one.throttle, one.brake) for one in pushes(8.0, control=Control(brake=0.8))} == {(0.0, 0.8)}
-
-
-def test_starts_before_signs_lie_up_the_street_and_show_every_limit() -> None:
-    roads, rng = load_town("town01"), np.random.default_rng(0)
-    passed = set()
-    for _ in range(60):
-        start, turn = starting_place(roads, 1.0, 0.0, rng)
-        assert turn is None
-        route = random_route(roads, start, 80.0, rng)
-        near = [route.line.project(sign.pose.x, sign.pose.y) for sign in roads.signs]
-        ahead = [(hit.s, sign.limit) for hit, sign in zip(near, roads.signs, strict=True) if -6 < hit.left < 0]
-        passed |= {limit for s, limit in ahead if 2 < s < 80}
-    assert passed == {30, 60, 90}
-
-
-def test_starts_are_anywhere_where_no_share_is_asked_for() -> None:
-    roads, rng = load_town("town02"), np.random.default_rng(0)
-    lanes = {roads.lane_at(starting_place(roads, 0.0, 0.0, rng)[0])[0].id for _ in range(200)}
-    assert len(lanes) > 0.7 * sum(lane.line.length > 12 for lane in roads.driveable)
-
-
-def test_starts_before_turns_lie_up_the_street_and_show_every_command() -> None:
-    roads, rng = load_town("town01"), np.random.default_rng(0)
-    taken = []
-    for _ in range(60):
-        start, turn = starting_place(roads, 0.0, 1.0, rng)
-        assert turn is not None
-        route = random_route(roads, start, 80.0, rng, through=turn)
-        assert turn in [lane for lane, _ in route.lanes]
-        at = route.line.project(*roads.lanes[turn].line.points[0])
-        assert 0 < at.s < 60
-        taken.append(roads.lanes[turn].turn)
-    assert min(taken.count(command) for command in Command) > 10
-
-
-def test_a_wheel_that_stays_lets_the_car_turn_too_late() -> None:
-    disturbance, steers = Disturbance(np.random.default_rng(1)), []
-    for k in range(2000):
-        wanted = 0.0 if k % 20 < 10 else 0.5
-        steers.append((wanted, disturbance.apply(Control(throttle=0.4, steer=wanted), 5.0).steer))
-    assert (0.5, 0.0) in steers
-    assert (0.0, 0.5) in steers
 
 
 def test_semantic_images_are_recorded_where_they_are_asked_for(unbroken: Path, tmp_path: Path) -> None:

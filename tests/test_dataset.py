@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from caldrive.episodes import EpisodeError, EpisodeWriter
-from caldrive.perception.dataset import Frames, Sampler, every_window, find_episodes, split
+from caldrive.perception.dataset import Frames
+from caldrive.perception.folders import find_episodes
 from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame, record
 
 SIZE = (HEIGHT, WIDTH)
@@ -20,21 +21,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def frames(folder: Path) -> Frames:
     return Frames(find_episodes(folder), SIZE)
-
-
-def test_whole_episodes_are_held_out_and_always_the_same(folder: Path) -> None:
-    episodes = find_episodes(folder)
-    train, held = split(episodes, 0.05, seed=3)
-    assert len(held) == 1
-    assert {e.id for e in train} | {e.id for e in held} == {e.id for e in episodes}
-    assert [e.id for e in split(episodes, 0.05, seed=3)[1]] == [e.id for e in held]
-
-
-def test_one_episode_is_too_few(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(EpisodeError, match="one each"):
-        split(find_episodes(folder)[:1], 0.05, seed=0)
-    with pytest.raises(EpisodeError, match="there is no episode"):
-        find_episodes(tmp_path)
 
 
 def test_a_window_stays_in_one_stream(frames: Frames) -> None:
@@ -74,31 +60,3 @@ def test_images_from_memory_and_from_jpeg_are_the_same(folder: Path, frames: Fra
 def test_another_image_size_is_refused(folder: Path) -> None:
     with pytest.raises(EpisodeError, match="64 x 32, the network takes 200 x 88"):
         Frames(find_episodes(folder), (88, 200), cache_gb=1.0)
-
-
-def test_rare_classes_are_drawn_more_often(frames: Frames) -> None:
-    hazard = frames.labels["hazard_stop"]
-    even, keen = (Sampler(frames, 1, balance, seed=0) for balance in (0.0, 1.0))
-    assert hazard[even.draw(0, 2000)].mean() == pytest.approx(hazard.mean(), abs=0.04)
-    assert hazard[keen.draw(0, 2000)].mean() > 1.5 * hazard.mean()
-
-
-def test_class_counts_expect_what_is_drawn(frames: Frames) -> None:
-    sampler = Sampler(frames, 3, 0.7, seed=0)
-    ids = (sampler.draw(0, 4000)[:, None] + np.arange(3)).ravel()
-    expected = sampler.class_counts()["hazard_stop"] / len(frames)
-    assert expected.sum() == pytest.approx(1.0)
-    assert frames.labels["hazard_stop"][ids].mean() == pytest.approx(expected[1], abs=0.03)
-
-
-def test_draws_depend_on_seed_and_step_only(frames: Frames) -> None:
-    first, second = Sampler(frames, 3, 0.5, seed=1), Sampler(frames, 3, 0.5, seed=1)
-    first.draw(0, 9)
-    assert first.draw(7, 9).tolist() == second.draw(7, 9).tolist()
-    assert first.draw(7, 9).tolist() != first.draw(8, 9).tolist()
-
-
-def test_validation_windows_cover_each_frame_once(frames: Frames) -> None:
-    starts = np.concatenate(list(every_window(frames, 5, batch=7)))
-    seen = (starts[:, None] + np.arange(5)).ravel()
-    assert sorted(seen.tolist()) == list(range(len(frames)))

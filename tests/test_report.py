@@ -14,8 +14,10 @@ import pytest
 import simplejpeg
 
 from caldrive.driving.benchmark import Driven
-from caldrive.driving.report import Run, failures, load_run, report_text, tables
+from caldrive.driving.report import Run, failures, load_run
 from caldrive.driving.report_page import report_page
+from caldrive.driving.report_tables import tables
+from caldrive.driving.report_text import report_text
 from caldrive.driving.suites import suite
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 

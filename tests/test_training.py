@@ -11,8 +11,9 @@ from torch import Tensor
 
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
-from caldrive.perception.dataset import Frames, find_episodes, split
+from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate, outputs_of, use_bf16
+from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import learning_rate

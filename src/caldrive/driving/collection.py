@@ -8,61 +8,33 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from caldrive.config import CameraConfig, CollectConfig, ControlConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Command, Control, Observation, Pose, Scenario
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Observation, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.driving.disturbance import Disturbance
 from caldrive.driving.pool import spread
+from caldrive.driving.starts import starting_place
 from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
 from caldrive.files import write_whole
 from caldrive.world.embedded import EmbeddedWorld
-from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.route import random_route
 from caldrive.world.towns import load_town
 from caldrive.world.weather import weather
 
-T = TypeVar("T")
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
 ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
-
-
-class Disturbance:
-    """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
-    that stays as it is, which lets the car turn in too late or keep turning for too long."""
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        self.rng, self.left, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
-
-    def apply(self, control: Control, speed: float) -> Control:
-        """The disturbed control. The faster the car, the weaker the push: its sideways acceleration is what counts."""
-        if self.left == 0:
-            if speed > 2.0 and self.rng.random() < 0.035:
-                self._begin(control, speed)
-            return control
-        share = 1 - abs(2 * self.left / self.length - 1)
-        self.left -= 1
-        effort = control.throttle - control.brake + share * self.pedal * (control.brake < 0.3)
-        steer = control.steer + share * self.push if self.push else self.wheel
-        return Control(*(float(np.clip(x, low, 1)) for x, low in ((effort, 0), (-effort, 0), (steer, -1))))
-
-    def _begin(self, control: Control, speed: float) -> None:
-        self.left = self.length = int(self.rng.integers(6, 19))
-        self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
-        self.wheel, self.push = control.steer, 0.0
-        if self.rng.random() < 0.6:
-            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2)
-            self.push = float(self.rng.choice([-1, 1]) * strength)
 
 
 class _HiddenCars(OraclePerception):
@@ -104,40 +76,6 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
             frames += len(mounts)
             world.step(driven)
     return frames
-
-
-def starting_place(
-    roads: RoadNetwork, before_signs: float, before_turns: float, rng: np.random.Generator
-) -> tuple[Pose, str | None]:
-    """Anywhere on the roads, or in a share of the cases some way before a sign or a turn at a junction; each limit and
-    each command gets as many of these. Returns the place, and the lane of that turn if any."""
-    chance = rng.random()
-    limits = sorted({sign.limit for sign in roads.signs})
-    if limits and chance < before_signs:
-        limit = _one_of(limits, rng)
-        sign = _one_of([sign for sign in roads.signs if sign.limit == limit], rng)
-        lane, at = roads.lane_at(sign.pose)
-        return _upstream(roads, lane, at - float(rng.uniform(15, 60))), None
-    turns = [lane for lane in roads.lanes.values() if lane.turn is not None]
-    commands = [command for command in Command if any(lane.turn is command for lane in turns)]
-    if commands and before_signs <= chance < before_signs + before_turns:
-        command = _one_of(commands, rng)
-        turn = _one_of([lane for lane in turns if lane.turn is command], rng)
-        return _upstream(roads, turn, -float(rng.uniform(5, 40))), turn.id
-    lane = _one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
-    return lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3))), None
-
-
-def _one_of(things: Sequence[T], rng: np.random.Generator) -> T:
-    return things[int(rng.integers(len(things)))]
-
-
-def _upstream(roads: RoadNetwork, lane: Lane, s: float) -> Pose:
-    """The place s m along a lane; where that is negative, as far up the street before it, but inside no junction."""
-    before = [one for one in roads.lanes.values() if lane.id in one.successors]
-    if s >= 1 or len(before) != 1 or before[0].turn is not None:
-        return lane.line.pose_at(max(s, 1.0))
-    return _upstream(roads, before[0], s + before[0].line.length)
 
 
 def _set_up(

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from caldrive.driving.report import Failure, Run, Table, failures, tables
+from caldrive.driving.report import Failure, Run, failures
 from caldrive.driving.report_figures import errors_figure, map_figure, speed_figure, success_figure
+from caldrive.driving.report_tables import Table, tables
 from caldrive.driving.witness import still_paths
 
 _DATA = Path(__file__).parent / "data"

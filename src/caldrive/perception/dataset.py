@@ -6,11 +6,9 @@ batch lists each frame once and says where the windows find it, so no frame pass
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Command
-from caldrive.episodes import LABELS, Episode, EpisodeError, read_episode
+from caldrive.episodes import LABELS, Episode, EpisodeError
 from caldrive.perception.specs import SPECS, encode_columns
 
 Ids = NDArray[np.int64]
@@ -44,61 +42,6 @@ class Batch:
     group: Tensor
     command: Tensor
     targets: dict[str, Tensor]
-
-
-def episode_paths(folder: Path | str) -> list[Path]:
-    """The files of a folder's episodes by name. Raises EpisodeError where there is none."""
-    paths = sorted(Path(folder).glob("**/*.parquet"))
-    if not paths:
-        raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
-    return paths
-
-
-def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
-    """All episodes of a folder by name; semantic: with their semantic images, where they have them.
-
-    Raises EpisodeError where there is none, or one is damaged.
-    """
-    return [read_episode(path, semantic) for path in episode_paths(folder)]
-
-
-def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
-    """How many frames of a recording have each value of the discrete affordances and of the command."""
-    found = {}
-    for name in (*(s.name for s in SPECS if s.discrete), "command"):
-        values, counts = np.unique(np.concatenate([e.columns[name] for e in episodes]), return_counts=True)
-        found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
-    return found
-
-
-def _short(value: Any) -> str:
-    return value if isinstance(value, str) else f"{value:g}"
-
-
-def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
-    """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for
-    each."""
-    if len(episodes) < 2:
-        raise EpisodeError(f"found {len(episodes)} episode, training and validation need one each: record more")
-    order = np.random.default_rng(seed).permutation(len(episodes))
-    n_held = min(max(1, round(share * len(episodes))), len(episodes) - 1)
-    held = set(order[:n_held].tolist())
-    return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
-
-
-def held_out(episodes: Sequence[Episode], data: Mapping[str, Any]) -> list[Episode]:
-    """The episodes that a network's training kept for validation. data: what its checkpoint remembers (`summary`).
-
-    Raises EpisodeError where they are not all among these episodes.
-    """
-    wanted = set(data.get("validation_episodes", ()))
-    found = [episode for episode in episodes if episode.key in wanted]
-    if not wanted or len(found) != len(wanted):
-        raise EpisodeError(
-            f"found {len(found)} of the {len(wanted)} episodes that the network's training kept for validation: give "
-            "the folder that it was trained on with --data, or leave --held-out away"
-        )
-    return found
 
 
 class Frames:
@@ -203,60 +146,3 @@ class Frames:
         frequencies = [(np.bincount(number) / len(self))[number] for number in numbers]
         rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
         return (1 / rarest) ** balance * np.where(self._standing, STANDING**balance, 1.0)
-
-
-class Sampler:
-    """Draws training windows: the rarer the rarest class or command in it, the likelier a window.
-
-    Hazards, red lights and signs fill a few percent of a drive; drawn evenly, most batches would hold none. What step k
-    draws depends on (seed, k) only, so a run can be taken up anywhere.
-    """
-
-    def __init__(self, frames: Frames, window: int, balance: float, seed: int) -> None:
-        self.frames, self.window, self.seed = frames, window, seed
-        self.starts = frames.starts(window)
-        if not len(self.starts):
-            raise EpisodeError(
-                f"no stream of frames is {window} long: record longer episodes or make the window shorter"
-            )
-        rarity = frames.rarity(balance)
-        weight = np.max([rarity[self.starts + i] for i in range(window)], axis=0)
-        self.probability = weight / weight.sum()
-        self._cumulative = np.cumsum(self.probability)
-
-    def draw(self, step: int, n: int) -> Ids:
-        """First frames of n windows."""
-        chance = np.random.default_rng((self.seed, step)).random(n) * self._cumulative[-1]
-        chosen: Ids = self.starts[np.searchsorted(self._cumulative, chance, side="right")]
-        return chosen
-
-    def class_counts(self) -> dict[str, NDArray[np.float64]]:
-        """How many samples of each class the drawn windows hold, by affordance, in expectation and scaled to the data's
-        size."""
-        share = np.zeros(len(self.frames))
-        for i in range(self.window):
-            np.add.at(share, self.starts + i, self.probability / self.window)
-        return {
-            s.name: np.bincount(self.frames.targets[s.name].numpy(), share * len(self.frames), s.outputs).astype(float)
-            for s in SPECS
-            if s.discrete
-        }
-
-
-def every_window(frames: Frames, window: int, batch: int) -> Iterator[Ids]:
-    """First frames of windows that cover every stream evenly, without overlap, in batches; a rest shorter than one is
-    left out."""
-    starts = frames.starts(window)
-    aligned = starts[(starts - frames.stream_start[starts]) % window == 0]
-    yield from (aligned[i : i + batch] for i in range(0, len(aligned), batch))
-
-
-def summary(train: Frames, held: Frames) -> dict[str, Any]:
-    """What a checkpoint remembers of its data. validation_episodes: keys of those that it never learnt from."""
-    counts = {s.name: np.bincount(train.targets[s.name], minlength=s.outputs).tolist() for s in SPECS if s.discrete}
-    return {
-        "train_frames": len(train),
-        "validation_frames": len(held),
-        "train_classes": counts,
-        "validation_episodes": sorted({held.source(i)[0].key for i in range(len(held))}),
-    }

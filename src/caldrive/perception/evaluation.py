@@ -10,9 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from caldrive.perception.dataset import Batch, Frames, Ids, every_window
+from caldrive.perception.dataset import Batch, Frames, Ids
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
+from caldrive.perception.sampler import every_window
 from caldrive.perception.specs import Outputs, Targets, losses, metrics
 
 BATCH = 128  # frames that are evaluated together

@@ -14,11 +14,12 @@ from torch.optim import Adam
 
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
-from caldrive.perception.dataset import Batch, Sampler
+from caldrive.perception.dataset import Batch
 from caldrive.perception.evaluation import autocast
 from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.repaint import repaint
+from caldrive.perception.sampler import Sampler
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from caldrive.episodes import Episode, EpisodeError, read_episode
 from caldrive.files import write_figure
-from caldrive.perception.dataset import class_counts, episode_paths
 from caldrive.perception.evaluation import Done, unwatched
+from caldrive.perception.folders import class_counts, episode_paths
 
 HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
     "vehicle_distance": (np.linspace(0, 50, 26), "m"),

@@ -18,10 +18,12 @@ from caldrive.files import write_whole
 from caldrive.perception.calibration import calibrated
 from caldrive.perception.checkpoint import CheckpointInfo, round_to_half, save_network
 from caldrive.perception.curves import Board, draw_curves
-from caldrive.perception.dataset import Frames, Sampler, find_episodes, split, summary
+from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
+from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Run, learning_rate
+from caldrive.perception.sampler import Sampler, summary
 from caldrive.perception.specs import class_weights
 from caldrive.perception.team import Team, join
 

@@ -1,0 +1,97 @@
+"""The verbs that record, check, train and evaluate."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import tyro
+
+from caldrive.commands.answer import Answer, Output
+from caldrive.driving.settings import (
+    CollectSettings,
+    DataSettings,
+    EvaluateSettings,
+    Progress,
+    TrainSettings,
+)
+
+
+@dataclass(frozen=True)
+class Collect(CollectSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.config import CollectConfig
+        from caldrive.driving.collection import collect
+        from caldrive.driving.outputs import require_writable_folder
+        from caldrive.driving.tables import counts_table
+        from caldrive.perception.folders import class_counts, find_episodes
+
+        require_writable_folder(self.out)
+        asked = {field.name: getattr(self, field.name) for field in fields(CollectConfig) if hasattr(self, field.name)}
+        config = CollectConfig(**asked)
+        for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
+            progress(f"recording, {done} done", done / self.episodes)
+        counts = class_counts(find_episodes(self.out))
+        return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
+
+
+@dataclass(frozen=True)
+class Data(DataSettings, Output):
+    folder: tyro.conf.Positional[Path] = Path("out/recording")
+    """Folder with the recorded episodes."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.outputs import require_writable_file
+        from caldrive.driving.tables_seen import recording_table
+        from caldrive.perception.recordings import check_recording, draw_histograms
+
+        require_writable_file(self.picture, "--picture")
+        found, episodes = check_recording(self.folder, lambda share: progress("checking", share))
+        if episodes:
+            draw_histograms(episodes, found.counts, self.picture)
+        picture = self.picture if episodes else None
+        values = asdict(found) | {"picture": str(picture) if picture else None}
+        return Answer(values, recording_table(found, picture), int(bool(found.damaged)))
+
+
+@dataclass(frozen=True)
+class Train(TrainSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from dataclasses import replace
+
+        from caldrive.config import PERCEPTIONS, TRAININGS
+        from caldrive.driving.outputs import require_writable_folder
+        from caldrive.perception.backbone import imagenet_file
+        from caldrive.perception.training import train
+
+        require_writable_folder(self.out)
+        if self.preset not in TRAININGS:
+            raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
+        config = replace(TRAININGS[self.preset], seed=self.seed, device=self.device)
+        config = config if self.steps is None else replace(config, steps=self.steps)
+        imagenet = self.imagenet or (imagenet_file() if PERCEPTIONS[self.preset].width == 1.0 else None)
+        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
+        return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
+
+
+@dataclass(frozen=True)
+class Evaluate(EvaluateSettings, Output):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.drivers import model_path
+        from caldrive.driving.outputs import require_writable_file
+        from caldrive.driving.tables_seen import evaluation_table
+        from caldrive.perception.checkpoint import load_network
+        from caldrive.perception.dataset import Frames
+        from caldrive.perception.folders import find_episodes, held_out
+        from caldrive.perception.report import PAPER, report
+
+        if self.worst is not None:
+            require_writable_file(self.worst, "--worst")
+        network, info = load_network(model_path(self.model))
+        episodes = find_episodes(self.data)
+        if self.held_out:
+            episodes = held_out(episodes, info.data)
+        frames = Frames(episodes, (network.config.image_height, network.config.image_width))
+        found = report(network, frames, self.worst, lambda share: progress("evaluating", share))
+        return Answer(asdict(found) | {"paper": PAPER}, evaluation_table(found))

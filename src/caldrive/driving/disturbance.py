@@ -1,0 +1,35 @@
+"""Short mishaps while recording: the steering and the speed go wrong, and the driver has to recover (section 3.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from caldrive.datatypes import Control
+
+
+class Disturbance:
+    """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
+    that stays as it is, which lets the car turn in too late or keep turning for too long."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng, self.left, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
+
+    def apply(self, control: Control, speed: float) -> Control:
+        """The disturbed control. The faster the car, the weaker the push: its sideways acceleration is what counts."""
+        if self.left == 0:
+            if speed > 2.0 and self.rng.random() < 0.035:
+                self._begin(control, speed)
+            return control
+        share = 1 - abs(2 * self.left / self.length - 1)
+        self.left -= 1
+        effort = control.throttle - control.brake + share * self.pedal * (control.brake < 0.3)
+        steer = control.steer + share * self.push if self.push else self.wheel
+        return Control(*(float(np.clip(x, low, 1)) for x, low in ((effort, 0), (-effort, 0), (steer, -1))))
+
+    def _begin(self, control: Control, speed: float) -> None:
+        self.left = self.length = int(self.rng.integers(6, 19))
+        self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
+        self.wheel, self.push = control.steer, 0.0
+        if self.rng.random() < 0.6:
+            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2)
+            self.push = float(self.rng.choice([-1, 1]) * strength)

@@ -1,0 +1,67 @@
+"""Folders of recorded episodes: found, counted, and split into those that train and those that validate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from caldrive.episodes import Episode, EpisodeError, read_episode
+from caldrive.perception.specs import SPECS
+
+
+def episode_paths(folder: Path | str) -> list[Path]:
+    """The files of a folder's episodes by name. Raises EpisodeError where there is none."""
+    paths = sorted(Path(folder).glob("**/*.parquet"))
+    if not paths:
+        raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
+    return paths
+
+
+def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
+    """All episodes of a folder by name; semantic: with their semantic images, where they have them.
+
+    Raises EpisodeError where there is none, or one is damaged.
+    """
+    return [read_episode(path, semantic) for path in episode_paths(folder)]
+
+
+def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
+    """How many frames of a recording have each value of the discrete affordances and of the command."""
+    found = {}
+    for name in (*(s.name for s in SPECS if s.discrete), "command"):
+        values, counts = np.unique(np.concatenate([e.columns[name] for e in episodes]), return_counts=True)
+        found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
+    return found
+
+
+def _short(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
+    """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for
+    each."""
+    if len(episodes) < 2:
+        raise EpisodeError(f"found {len(episodes)} episode, training and validation need one each: record more")
+    order = np.random.default_rng(seed).permutation(len(episodes))
+    n_held = min(max(1, round(share * len(episodes))), len(episodes) - 1)
+    held = set(order[:n_held].tolist())
+    return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
+
+
+def held_out(episodes: Sequence[Episode], data: Mapping[str, Any]) -> list[Episode]:
+    """The episodes that a network's training kept for validation. data: what its checkpoint remembers (`summary`).
+
+    Raises EpisodeError where they are not all among these episodes.
+    """
+    wanted = set(data.get("validation_episodes", ()))
+    found = [episode for episode in episodes if episode.key in wanted]
+    if not wanted or len(found) != len(wanted):
+        raise EpisodeError(
+            f"found {len(found)} of the {len(wanted)} episodes that the network's training kept for validation: give "
+            "the folder that it was trained on with --data, or leave --held-out away"
+        )
+    return found

@@ -1,0 +1,62 @@
+"""Mishaps while recording are short, bounded, and leave the driver room to recover."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from caldrive.datatypes import Control
+from caldrive.driving.disturbance import Disturbance
+
+controls = st.builds(
+    lambda effort, steer: Control(max(effort, 0.0), max(-effort, 0.0), steer), st.floats(-1, 1), st.floats(-1, 1)
+)
+
+
+@given(st.integers(0, 2**32), st.lists(st.tuples(controls, st.floats(0, 25)), min_size=1, max_size=60))
+def test_a_disturbance_is_bounded_and_ends(seed: int, drive: list[tuple[Control, float]]) -> None:
+    disturbance, before, slowest = Disturbance(np.random.default_rng(seed)), [0.0], 25.0
+    for control, speed in drive:
+        pushed = disturbance.apply(control, speed)  # a Control checks its own ranges
+        before.append(control.steer)
+        slowest = min(slowest, max(speed, 2.0))  # a push is as strong as the speed at its beginning allows
+        assert abs(pushed.steer - control.steer) <= min(1.0, 36 / slowest**2) + 1e-9 or pushed.steer in before
+        assert abs((pushed.throttle - pushed.brake) - (control.throttle - control.brake)) <= 0.5 + 1e-9
+
+
+def pushes(speed: float, seed: int = 0, steps: int = 20_000, control: Control | None = None) -> list[Control]:
+    disturbance, control = Disturbance(np.random.default_rng(seed)), control or Control(throttle=0.4)
+    return [disturbance.apply(control, speed) for _ in range(steps)]
+
+
+def test_disturbances_are_short_and_leave_most_of_the_drive_alone() -> None:
+    disturbed = [one != Control(throttle=0.4) for one in pushes(5.0)]
+    assert 0.03 < np.mean(disturbed) < 0.3
+    assert max(len(list(run)) for pushed, run in groupby(disturbed) if pushed) < 19
+
+
+def test_a_slow_car_is_not_disturbed() -> None:
+    assert set(pushes(1.0, steps=3000)) == {Control(throttle=0.4)}
+
+
+def test_the_push_at_the_wheel_goes_to_both_sides_and_weakens_with_speed() -> None:
+    slow, fast = (np.array([one.steer for one in pushes(speed)]) for speed in (5.0, 20.0))
+    assert slow.max() > 0.25
+    assert slow.min() < -0.25
+    assert np.abs(fast).max() <= (6 / 20) ** 2 + 1e-9
+
+
+def test_a_hard_braking_car_is_left_to_brake() -> None:
+    assert {(one.throttle, one.brake) for one in pushes(8.0, control=Control(brake=0.8))} == {(0.0, 0.8)}
+
+
+def test_a_wheel_that_stays_lets_the_car_turn_too_late() -> None:
+    disturbance, steers = Disturbance(np.random.default_rng(1)), []
+    for k in range(2000):
+        wanted = 0.0 if k % 20 < 10 else 0.5
+        steers.append((wanted, disturbance.apply(Control(throttle=0.4, steer=wanted), 5.0).steer))
+    assert (0.5, 0.0) in steers
+    assert (0.0, 0.5) in steers

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from caldrive.perception.dataset import Frames
+from caldrive.perception.folders import find_episodes
+from caldrive.perception.sampler import Sampler, every_window
+from tests.perception_data import HEIGHT, WIDTH, record
+
+SIZE = (HEIGHT, WIDTH)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("episodes"), n_episodes=4, n_frames=20)
+
+
+@pytest.fixture(scope="module")
+def frames(folder: Path) -> Frames:
+    return Frames(find_episodes(folder), SIZE)
+
+
+def test_rare_classes_are_drawn_more_often(frames: Frames) -> None:
+    hazard = frames.labels["hazard_stop"]
+    even, keen = (Sampler(frames, 1, balance, seed=0) for balance in (0.0, 1.0))
+    assert hazard[even.draw(0, 2000)].mean() == pytest.approx(hazard.mean(), abs=0.04)
+    assert hazard[keen.draw(0, 2000)].mean() > 1.5 * hazard.mean()
+
+
+def test_class_counts_expect_what_is_drawn(frames: Frames) -> None:
+    sampler = Sampler(frames, 3, 0.7, seed=0)
+    ids = (sampler.draw(0, 4000)[:, None] + np.arange(3)).ravel()
+    expected = sampler.class_counts()["hazard_stop"] / len(frames)
+    assert expected.sum() == pytest.approx(1.0)
+    assert frames.labels["hazard_stop"][ids].mean() == pytest.approx(expected[1], abs=0.03)
+
+
+def test_draws_depend_on_seed_and_step_only(frames: Frames) -> None:
+    first, second = Sampler(frames, 3, 0.5, seed=1), Sampler(frames, 3, 0.5, seed=1)
+    first.draw(0, 9)
+    assert first.draw(7, 9).tolist() == second.draw(7, 9).tolist()
+    assert first.draw(7, 9).tolist() != first.draw(8, 9).tolist()
+
+
+def test_validation_windows_cover_each_frame_once(frames: Frames) -> None:
+    starts = np.concatenate(list(every_window(frames, 5, batch=7)))
+    seen = (starts[:, None] + np.arange(5)).ravel()
+    assert sorted(seen.tolist()) == list(range(len(frames)))
