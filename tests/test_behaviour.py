@@ -1,54 +1,40 @@
-"""Figures of driving on trajectories whose answers are known."""
+"""What an agent was off by, on steps whose answers are known."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from caldrive.driving.behaviour import motion
-
-DT = 0.1
-TIME = np.arange(0, 20, DT)
-
-
-def test_a_steady_drive_straight_on_is_perfectly_smooth() -> None:
-    found = motion(np.full(200, 8.0), np.zeros(200), DT)
-    assert found["jerk"] == pytest.approx(0, abs=1e-9)
-    assert (found["turning"], found["lateral_straight"], found["comfortable"]) == (0.0, pytest.approx(0), 1.0)
+from caldrive.datatypes import Affordances, Control, Decision, DriveState, Observation, Pose, Step, Truth, VehicleState
+from caldrive.driving.behaviour import Behaviour
+from caldrive.results import Infraction, InfractionKind
+from tests.perception_data import column_image
 
 
-def test_even_acceleration_has_no_jerk() -> None:
-    found = motion(1.5 * TIME, np.zeros(200), DT)
-    assert found["jerk"] == pytest.approx(0, abs=1e-9)
-    assert found["comfortable"] == 1.0
+def step(time: float, seen: Affordances, true: Affordances, opposite: float = 0.0) -> Step:
+    observation = Observation(time, column_image(0.0), 5.0, "straight")  # type: ignore[arg-type]
+    truth = Truth(time, VehicleState(Pose(5 * time, 0, 0), 5.0), true, opposite_share=opposite)
+    return Step(observation, truth, Control(), Decision(Control(), seen, DriveState.CRUISING, 30.0, 20.0))
 
 
-def test_a_swinging_speed_has_the_jerk_of_its_second_derivative() -> None:
-    found = motion(10 + np.sin(0.5 * TIME), np.zeros(200), DT)
-    assert found["jerk"] == pytest.approx(0.25 / math.sqrt(2), rel=0.05)
+def test_errors_are_means_over_the_episode_and_over_the_seconds_before_an_infraction() -> None:
+    true, behaviour = Affordances(), Behaviour()
+    for k in range(100):
+        wrong = replace(true, relative_angle=0.3, hazard_stop=0.9) if k >= 75 else true
+        behaviour.add(step(k / 10, wrong, true))
+    figures = behaviour.figures([Infraction(InfractionKind.SIDEWALK, 9.9, 0, 0)])
+    assert figures["error/relative_angle"] == pytest.approx(0.3 * 0.25)
+    assert figures["error/hazard_stop"] == pytest.approx(0.25)
+    assert figures["before/0/relative_angle"] == pytest.approx(0.3 * 25 / 30, abs=0.011)
+    assert figures["before/0/red_light"] == 0
 
 
-def test_a_steady_turn_counts_as_turning_without_lateral_jerk() -> None:
-    found = motion(np.full(200, 5.0), 0.3 * TIME, DT)
-    assert found["turning"] == pytest.approx(20.0)
-    assert found["lateral_turn"] == pytest.approx(0, abs=1e-9)
-
-
-def test_a_swinging_wheel_has_the_lateral_jerk_of_its_yaw_acceleration() -> None:
-    heading = 0.2 * np.sin(TIME)  # yaw rate 0.2 cos, lateral jerk 5 m/s times -0.2 sin
-    found = motion(np.full(200, 5.0), heading, DT)
-    both = math.sqrt(
-        (found["turning"] * found["lateral_turn"] ** 2 + (20 - found["turning"]) * found["lateral_straight"] ** 2) / 20
-    )
-    assert both == pytest.approx(1.0 / math.sqrt(2), rel=0.06)
-
-
-@pytest.mark.parametrize("speed", [6.0 * TIME, np.maximum(20 - 5.0 * TIME, 0)])
-def test_hard_acceleration_and_braking_are_not_comfortable(speed: np.ndarray) -> None:
-    assert motion(speed, np.zeros(200), DT)["comfortable"] < 0.9
-
-
-def test_an_episode_of_a_moment_has_figures_too() -> None:
-    assert motion(np.ones(2), np.zeros(2), DT)["jerk"] == 0
+def test_each_red_light_is_met_once_and_time_off_the_lane_counts() -> None:
+    behaviour = Behaviour()
+    for k in range(60):
+        true = Affordances(red_light=float(k % 20 < 5))
+        behaviour.add(step(k / 10, true, true, opposite=0.5 if k < 15 else 0.1))
+    figures = behaviour.figures([])
+    assert figures["reds_met"] == 3
+    assert figures["off_lane"] == pytest.approx(0.25)

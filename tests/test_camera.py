@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -26,13 +25,6 @@ MOUNT = CameraConfig()
 @pytest.fixture(scope="module")
 def roads() -> RoadNetwork:
     return load_town("town02")
-
-
-@pytest.fixture(scope="module")
-def camera(roads: RoadNetwork) -> Iterator[Camera]:
-    made = Camera(roads, build_scenery(roads))
-    yield made
-    made.close()
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,9 @@ import pytest
 from caldrive.episodes import EpisodeError, EpisodeWriter
 from caldrive.perception.dataset import Frames
 from caldrive.perception.folders import find_episodes
-from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame, record
+from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
 
 SIZE = (HEIGHT, WIDTH)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("episodes"), n_episodes=4, n_frames=20)
-
-
-@pytest.fixture(scope="module")
-def frames(folder: Path) -> Frames:
-    return Frames(find_episodes(folder), SIZE)
 
 
 def test_a_window_stays_in_one_stream(frames: Frames) -> None:

@@ -5,21 +5,10 @@ from pathlib import Path
 import pytest
 
 from caldrive.episodes import EpisodeError
-from caldrive.perception.dataset import Frames
 from caldrive.perception.folders import find_episodes, split
-from tests.perception_data import HEIGHT, WIDTH, record
+from tests.perception_data import HEIGHT, WIDTH
 
 SIZE = (HEIGHT, WIDTH)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("episodes"), n_episodes=4, n_frames=20)
-
-
-@pytest.fixture(scope="module")
-def frames(folder: Path) -> Frames:
-    return Frames(find_episodes(folder), SIZE)
 
 
 def test_whole_episodes_are_held_out_and_always_the_same(folder: Path) -> None:

@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.datatypes import Pose, Scenario
-from caldrive.driving.benchmark import Driven
 from caldrive.driving.measures import cells, completion, driving_score, rates, wilson
-from caldrive.driving.suites import Trial
+from caldrive.driving.suites import Driven, Trial
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 
 SCENARIO = Scenario("town01", 1, Pose(0, 0, 0), Pose(1, 0, 0), task="one-turn")

@@ -16,7 +16,7 @@ from caldrive.datatypes import (
     Truth,
     VehicleState,
 )
-from caldrive.driving.referee import REST_FRAMES, Referee, comfort
+from caldrive.driving.referee import REST_FRAMES, Referee
 from caldrive.results import InfractionKind, Outcome
 
 SCENARIO = Scenario("town", 1, Pose(0, 0, 0), Pose(1000, 0, 0), time_limit=1000.0)
@@ -171,11 +171,3 @@ def test_result_sums_up_the_drive() -> None:
     assert (result.distance, result.duration) == (pytest.approx(30.0), pytest.approx(3.0))
     assert (result.route_done, result.route_length) == (30.0, 100.0)
     assert Referee(SCENARIO).result().distance == 0.0
-
-
-def test_comfort_figures() -> None:
-    times = [0.1 * i for i in range(50)]
-    figures = comfort(times, [0.5 * 2.0 * t * t for t in times], [-0.4, 0.1, 0.2])
-    assert figures["jerk"] == pytest.approx(2.0)
-    assert figures["center_distance"] == pytest.approx(0.2)
-    assert comfort([], [], []) == {"center_distance": 0.0, "jerk": 0.0}

@@ -1,26 +1,13 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from caldrive.perception.dataset import Frames
-from caldrive.perception.folders import find_episodes
 from caldrive.perception.sampler import Sampler, every_window
-from tests.perception_data import HEIGHT, WIDTH, record
+from tests.perception_data import HEIGHT, WIDTH
 
 SIZE = (HEIGHT, WIDTH)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("episodes"), n_episodes=4, n_frames=20)
-
-
-@pytest.fixture(scope="module")
-def frames(folder: Path) -> Frames:
-    return Frames(find_episodes(folder), SIZE)
 
 
 def test_rare_classes_are_drawn_more_often(frames: Frames) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ from caldrive.datatypes import PedestrianState, VehicleState
 from caldrive.geometry import moved
 from caldrive.world.camera import Camera
 from caldrive.world.roads import RoadNetwork
-from caldrive.world.scenery import build_scenery
 from caldrive.world.semantics import Semantic
 from caldrive.world.towns import load_town
 
@@ -22,13 +19,6 @@ MOUNT = CameraConfig(400, 176)
 @pytest.fixture(scope="module")
 def roads() -> RoadNetwork:
     return load_town("town01")
-
-
-@pytest.fixture(scope="module")
-def camera(roads: RoadNetwork) -> Iterator[Camera]:
-    made = Camera(roads, build_scenery(roads))
-    yield made
-    made.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Several processes that train one network: they end with the weights that one process would have found."""
+"""Several processes that train one network: together they find the gradient that one process would have found."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLAIN = PerceptionConfig(**{
 })  # fmt: skip
 PLAIN = replace(PLAIN, batch_norm=False)
 SHORT = TrainingConfig(
-    steps=3, batch=4, warm_up=1, evaluate_every=2, save_every=1, precision="fp32", augment=False,
+    steps=1, batch=4, warm_up=1, evaluate_every=2, save_every=1, precision="fp32", augment=False,
     validation_share=0.3, device="cpu",
 )  # fmt: skip
 
@@ -35,7 +35,7 @@ def _member(rank: int, port: int, data: Path, out: Path) -> None:
     train(SHORT, data, out, PLAIN, progress=False)
 
 
-def test_two_processes_find_the_weights_that_one_finds(tmp_path: Path) -> None:
+def test_two_processes_find_the_gradient_that_one_finds(tmp_path: Path) -> None:
     data = record(tmp_path / "data")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -48,8 +48,11 @@ def test_two_processes_find_the_weights_that_one_finds(tmp_path: Path) -> None:
         member.join(120)
     assert [member.exitcode for member in members] == [0, 0]
     one, two = (read_tensors(tmp_path / name / "state.safetensors")[0] for name in ("one", "two"))
-    for name in one:
-        assert torch.allclose(one[name].float(), two[name].float(), atol=2e-4), name
+    moments = [name for name in one if name.endswith("exp_avg")]  # a tenth of the gradient
+    assert moments
+    for name in moments:
+        assert torch.allclose(one[name], two[name], rtol=1e-3, atol=1e-5), name
+    assert max(float(one[name].abs().max()) for name in moments) > 1e-2
 
 
 def test_one_process_is_a_team_of_its_own() -> None:

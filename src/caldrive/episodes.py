@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
@@ -22,8 +21,9 @@ import pyarrow.parquet as pq
 import simplejpeg
 from numpy.typing import NDArray
 
-from caldrive.datatypes import Affordances, Command, Control, Image, Pose, Scenario
+from caldrive.datatypes import Affordances, Command, Control, Image, Scenario
 from caldrive.files import write_whole
+from caldrive.scenarios import scenario_from_json, scenario_to_json
 
 FORMAT_VERSION = 1
 METADATA_KEY = b"caldrive"
@@ -71,21 +71,6 @@ class Frame:
     camera_left: float = 0.0
     camera_yaw: float = 0.0
     semantic: NDArray[np.uint8] | None = None
-
-
-def scenario_to_json(scenario: Scenario) -> str:
-    """A scenario as JSON; an infinite time limit becomes null."""
-    values = asdict(scenario)
-    values["time_limit"] = None if math.isinf(scenario.time_limit) else scenario.time_limit
-    return json.dumps(values)
-
-
-def scenario_from_json(text: str) -> Scenario:
-    """The inverse of `scenario_to_json`."""
-    values: dict[str, Any] = json.loads(text)
-    values["start"], values["goal"] = Pose(**values["start"]), Pose(**values["goal"])
-    values["time_limit"] = math.inf if values["time_limit"] is None else values["time_limit"]
-    return Scenario(**values)
 
 
 def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:

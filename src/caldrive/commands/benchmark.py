@@ -9,10 +9,7 @@ from pathlib import Path
 import tyro
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import (
-    BenchmarkSettings,
-    Progress,
-)
+from caldrive.driving.settings import BenchmarkSettings, Progress
 
 
 @dataclass(frozen=True)

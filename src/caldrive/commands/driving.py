@@ -6,11 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import (
-    DeterminismSettings,
-    DriveSettings,
-    Progress,
-)
+from caldrive.driving.settings import DeterminismSettings, DriveSettings, Progress
 
 
 @dataclass(frozen=True)

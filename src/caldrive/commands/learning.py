@@ -9,13 +9,7 @@ from pathlib import Path
 import tyro
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import (
-    CollectSettings,
-    DataSettings,
-    EvaluateSettings,
-    Progress,
-    TrainSettings,
-)
+from caldrive.driving.settings import CollectSettings, DataSettings, EvaluateSettings, Progress, TrainSettings
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import (
-    AgentSpeedSettings,
-    Progress,
-    WorldSpeedSettings,
-)
+from caldrive.driving.settings import AgentSpeedSettings, Progress, WorldSpeedSettings
 
 
 @dataclass(frozen=True)

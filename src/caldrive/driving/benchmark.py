@@ -11,7 +11,6 @@ import json
 import os
 import platform
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache, partial
 from pathlib import Path
@@ -22,25 +21,16 @@ from caldrive.driving.behaviour import Behaviour
 from caldrive.driving.drivers import model_path, set_up
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.pool import spread
+from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
-from caldrive.driving.suites import Trial, suite
+from caldrive.driving.suites import SUITES, Driven, Trial, suite
 from caldrive.driving.trace import plain, result_from_values, result_values
 from caldrive.driving.witness import Witness
 from caldrive.files import write_whole
-from caldrive.results import EpisodeResult
 
 PACKAGE = Path(__file__).parents[1]
 RESULTS, RUN = "results.jsonl", "run.json"
-
-
-@dataclass(frozen=True)
-class Driven:
-    """A trial and how it went. figures: those of `Behaviour`, by name."""
-
-    trial: Trial
-    result: EpisodeResult
-    figures: dict[str, Any]
 
 
 def code_version() -> str:
@@ -52,6 +42,10 @@ def code_version() -> str:
     return digest.hexdigest()[:16]
 
 
+def _digest(path: Path | None) -> str | None:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path else None
+
+
 def _machine() -> str:
     """The processor in words, and how many cores it has."""
     info = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").is_file() else ""
@@ -61,14 +55,10 @@ def _machine() -> str:
 
 def _identity(settings: BenchmarkSettings) -> dict[str, Any]:
     """What a folder's results depend on."""
-    model = None
-    if settings.agent == "cal":
-        model = hashlib.sha256(model_path(settings.model).read_bytes()).hexdigest()[:16]
-    content = (
-        hashlib.sha256(Path(settings.suite).read_bytes()).hexdigest()[:16] if settings.suite[-5:] == ".json" else ""
-    )
+    model = model_path(settings.model) if settings.agent == "cal" else None
+    own = Path(settings.suite) if settings.suite not in SUITES else None
     return {
-        "suite": settings.suite, "suite_content": content, "agent": settings.agent, "model": model,
+        "suite": settings.suite, "suite_content": _digest(own), "agent": settings.agent, "model": _digest(model),
         "cap": None if settings.signs else settings.cap, "preset": settings.preset,
         "time_limit": settings.time_limit, "seed": settings.seed, "code": code_version(),
     }  # fmt: skip
@@ -85,10 +75,7 @@ def _claim(settings: BenchmarkSettings) -> None:
         }  # fmt: skip
         write_whole(path, (json.dumps(wanted | file, indent=2) + "\n").encode())
         return
-    try:
-        found = dict(json.loads(path.read_text()))
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"found that {path} is damaged, wanted a run's description: give another --out") from error
+    found = read_run(settings.out)
     for name, value in wanted.items():
         if found.get(name) != value:
             raise ValueError(
@@ -104,9 +91,7 @@ def read_run(folder: Path) -> dict[str, Any]:
     try:
         return dict(json.loads(path.read_text()))
     except (ValueError, TypeError) as error:
-        raise ValueError(
-            f"found that {path} is damaged, wanted a run's description: run the benchmark again"
-        ) from error
+        raise ValueError(f"found that {path} is damaged, wanted a run's description: give another --out") from error
 
 
 def read_lines(path: Path) -> dict[str, dict[str, Any]]:
@@ -138,13 +123,14 @@ def _set_up(driver: DriverSettings) -> Any:
 def drive_trial(driver: DriverSettings, folder: Path, trial: Trial) -> dict[str, Any]:
     """Drives one trial; leaves its trace and stills in a folder and returns its line."""
     world, agent = _set_up(driver)
-    behaviour, witness = Behaviour(world.dt), Witness(world, trial.scenario)
+    referee = Referee(trial.scenario, trial.fatal)
+    behaviour, witness = Behaviour(), Witness(world, referee)
 
     def watch(step: Step) -> None:
         behaviour.add(step)
         witness.add(step)
 
-    result = run_episode(world, agent, trial.scenario, watch, trial.fatal)
+    result = run_episode(world, agent, trial.scenario, watch, referee)
     witness.write(folder, trial.key, result)
     figures = behaviour.figures(result.infractions)
     return {"key": trial.key, "result": result_values(result), "figures": {k: plain(v) for k, v in figures.items()}}

@@ -13,6 +13,7 @@ from caldrive.driving.drivers import chosen_scenarios, set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.plots import draw_speed
+from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriveSettings, Progress, silent
 from caldrive.driving.trace import Trace, episode_json, result_values
@@ -54,9 +55,10 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
         for k, scenario in enumerate(scenarios):
             trace = Trace()
             text = caption(scenario, k + 1, len(scenarios))
-            film = EpisodeFilm(video, world, scenario, text, truth=settings.agent != "oracle")
+            referee = Referee(scenario)
+            film = EpisodeFilm(video, world, referee, text, truth=settings.agent != "oracle")
             watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]
-            result = run_episode(world, agent, scenario, _each(watchers + [film.add] * settings.video))
+            result = run_episode(world, agent, scenario, _each(watchers + [film.add] * settings.video), referee)
             film.end(result)
             results.append(result)
             files.append(settings.out / f"episode-{k:03d}.json")

@@ -23,22 +23,24 @@ def caption(scenario: Scenario, number: int, of: int) -> str:
 
 
 class EpisodeFilm:
-    """Films one episode in a world. truth: whether the true affordances are shown beside those the agent goes by."""
+    """Films one episode in a world, and what its referee counts.
 
-    def __init__(self, video: VideoWriter, world: EmbeddedWorld, scenario: Scenario, text: str, truth: bool) -> None:
-        self.video, self.world, self.scenario, self.text, self.truth = video, world, scenario, text, truth
-        self._referee = Referee(scenario)
+    truth: whether the true affordances are shown beside those the agent goes by.
+    """
+
+    def __init__(self, video: VideoWriter, world: EmbeddedWorld, referee: Referee, text: str, truth: bool) -> None:
+        self.video, self.world, self.referee, self.text, self.truth = video, world, referee, text, truth
         self._hud: Hud | None = None  # drawn for a route, which is known after the world's reset
         self._last: Image | None = None
 
     def add(self, step: Step) -> None:
         """Film the world as it stands at a step."""
         if self._hud is None:
-            minimap = MiniMap(self.world.roads, self.world.route, self.scenario.goal, PANEL)
-            self._hud = Hud(self.text, self.scenario.time_limit, minimap, self.truth)
-        self._referee.watch(step.truth)
+            scenario = self.referee.scenario
+            minimap = MiniMap(self.world.roads, self.world.route, scenario.goal, PANEL)
+            self._hud = Hud(self.text, scenario.time_limit, minimap, self.truth)
         [view] = self.world.images([CAMERA])
-        self._last = self._hud.draw(view, step, self._referee.infractions)
+        self._last = self._hud.draw(view, step, self.referee.infractions)
         self.video.add(self._last)
 
     def end(self, result: EpisodeResult) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from caldrive.driving.behaviour import CONTINUOUS, DISCRETE
-from caldrive.driving.benchmark import Driven
+from caldrive.driving.behaviour import NAMES
+from caldrive.driving.suites import Driven
 from caldrive.results import InfractionKind, Outcome
 
 Z95 = 1.959964  # of a normal distribution, two-sided
@@ -110,27 +110,24 @@ def rates(driven: Sequence[Driven]) -> list[Rate]:
 def comfort(driven: Sequence[Driven]) -> dict[str, float]:
     """Figures of supplement 3.2 over all episodes, each weighted by its time: median centre-line distance in m, RMS
     jerks in m/s³, share of time within nuPlan's bounds."""
-    seconds = sum(one.figures["seconds"] for one in driven)
-    turning = sum(one.figures["turning"] for one in driven)
+    drives = [(one.result.comfort, one.result.duration) for one in driven]
 
-    def rms(name: str, weight: Callable[[Driven], float], whole: float) -> float:
-        return math.sqrt(sum(weight(one) * one.figures[name] ** 2 for one in driven) / whole) if whole else 0.0
+    def mean(name: str, power: int, weights: Iterable[float]) -> float:
+        weighed = [(c[name] ** power, w) for (c, _), w in zip(drives, weights, strict=True)]
+        whole = sum(w for _, w in weighed)
+        return (sum(v * w for v, w in weighed) / whole) ** (1 / power) if whole else 0.0
 
     return {
-        "center_distance": median(one.figures["center_distance"] for one in driven) if driven else 0.0,
-        "jerk": rms("jerk", lambda one: float(one.figures["seconds"]), seconds),
-        "lateral_straight": rms(
-            "lateral_straight", lambda one: float(one.figures["seconds"] - one.figures["turning"]), seconds - turning
-        ),
-        "lateral_turn": rms("lateral_turn", lambda one: float(one.figures["turning"]), turning),
-        "comfortable": sum(one.figures["seconds"] * one.figures["comfortable"] for one in driven) / seconds
-        if seconds
-        else 1.0,
+        "center_distance": median(c["center_distance"] for c, _ in drives) if drives else 0.0,
+        "jerk": mean("jerk", 2, (time for _, time in drives)),
+        "lateral_straight": mean("lateral_straight", 2, (max(0.0, time - c["turning"]) for c, time in drives)),
+        "lateral_turn": mean("lateral_turn", 2, (c["turning"] for c, _ in drives)),
+        "comfortable": mean("comfortable", 1, (time for _, time in drives)),
     }
 
 
 def reds(driven: Sequence[Driven]) -> tuple[int, int]:
-    """Red lights met, and of these run."""
+    """Red lights met, and of these run. One that turned red as the car came to it is met when it is run."""
     met = sum(int(one.figures["reds_met"]) for one in driven)
     run = sum(i.kind is InfractionKind.RED_LIGHT for one in driven for i in one.result.infractions)
     return max(met, run), run
@@ -140,9 +137,8 @@ def errors(driven: Sequence[Driven]) -> dict[str, float]:
     """What the affordances were off by while driving, weighted by time: shares of frames for the discrete ones, mean
     absolute errors in SI units for the others."""
     found: dict[str, float] = {}
-    for name in (*DISCRETE, "speed_sign", *CONTINUOUS):
+    for name in NAMES:
         known = [one for one in driven if one.figures.get(f"error/{name}") is not None]
-        weight = sum(one.figures["seconds"] for one in known)
-        if weight:
-            found[name] = sum(one.figures["seconds"] * one.figures[f"error/{name}"] for one in known) / weight
+        if whole := sum(one.result.duration for one in known):
+            found[name] = sum(one.figures[f"error/{name}"] * one.result.duration for one in known) / whole
     return found

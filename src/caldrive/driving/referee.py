@@ -10,9 +10,8 @@ import math
 from collections import deque
 from collections.abc import Collection
 
-import numpy as np
-
 from caldrive.datatypes import ContactKind, LightState, Scenario, TrafficLight, Truth, VehicleState
+from caldrive.driving.comfort import comfort
 from caldrive.geometry import wrap_angle
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 
@@ -62,15 +61,6 @@ def runs_red(light: TrafficLight, last: VehicleState, ego: VehicleState) -> bool
     return light.state is LightState.RED and turned <= LIGHT_ANGLE and crosses(light, front(last), front(ego))
 
 
-def comfort(times: list[float], speeds: list[float], centers: list[float]) -> dict[str, float]:
-    """Figures of supplement 3.2 by name: median |centre distance| in m, RMS jerk along the road in m/s³."""
-    figures = {"center_distance": float(np.median(np.abs(centers))) if centers else 0.0, "jerk": 0.0}
-    if len(times) > 2:
-        dt = (times[-1] - times[0]) / (len(times) - 1)
-        figures["jerk"] = float(np.sqrt(np.mean((np.diff(speeds, n=2) / dt**2) ** 2)))
-    return figures
-
-
 class Referee:
     """One episode's referee. infractions: those so far, each once, with its time and place. fatal: infractions that end
     the episode as a failure."""
@@ -86,6 +76,7 @@ class Referee:
         self._distance = 0.0
         self._times: list[float] = []
         self._speeds: list[float] = []
+        self._headings: list[float] = []
         self._centers: list[float] = []
 
     def watch(self, truth: Truth) -> Outcome | None:
@@ -113,7 +104,7 @@ class Referee:
             route_done=last.route_done if last else 0.0,
             route_length=last.route_length if last else math.inf,
             infractions=tuple(self.infractions),
-            comfort=comfort(self._times, self._speeds, self._centers),
+            comfort=comfort(self._times, self._speeds, self._headings, self._centers),
         )
 
     def _watch_shares(self, truth: Truth) -> None:
@@ -154,4 +145,5 @@ class Referee:
         self._frame += 1
         self._times.append(truth.time)
         self._speeds.append(truth.ego.speed)
+        self._headings.append(truth.ego.pose.heading)
         self._centers.append(truth.affordances.center_distance)

@@ -13,6 +13,7 @@ from caldrive.driving.benchmark import RESULTS, read_lines, read_run
 from caldrive.driving.drivers import set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.outputs import require_writable_file
+from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriverSettings, Progress, silent
 from caldrive.driving.suites import Trial, suite
@@ -49,13 +50,14 @@ def replay(folder: Path, key: str, out: Path, progress: Progress = silent) -> Re
     model = Path(run["model_file"]) if run["model_file"] else None
     world, agent = set_up(DriverSettings(agent=run["agent"], model=model, preset=run["preset"], cap=run["cap"]))
     with closing(world), VideoWriter(out, rate=1 / world.dt) as video:
-        film = EpisodeFilm(video, world, trial.scenario, f"{caption(trial.scenario, 1, 1)}   {key}", truth=True)
+        referee = Referee(trial.scenario, trial.fatal)
+        film = EpisodeFilm(video, world, referee, f"{caption(trial.scenario, 1, 1)}   {key}", truth=True)
 
         def watch(step: Step) -> None:
             film.add(step)
             progress(key, min(1.0, step.truth.route_done / step.truth.route_length))
 
-        result = run_episode(world, agent, trial.scenario, watch, trial.fatal)
+        result = run_episode(world, agent, trial.scenario, watch, referee)
         film.end(result)
     same = key in known and known[key]["result"] == json.loads(json.dumps(result_values(result)))
     return Replay(result, same, out)

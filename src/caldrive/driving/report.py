@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from caldrive.driving.benchmark import Driven, read_results, read_run
+from caldrive.driving.benchmark import read_results, read_run
 from caldrive.driving.settings import BenchmarkSettings
+from caldrive.driving.suites import Driven
 from caldrive.results import Outcome
 
 UNITS = {"vehicle_distance": "m", "relative_angle": "rad", "center_distance": "m"}

@@ -3,9 +3,7 @@ distance."""
 
 from __future__ import annotations
 
-import gzip
 import io
-import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -18,7 +16,7 @@ from caldrive.config import KMH
 from caldrive.driving.measures import cells
 from caldrive.driving.published import SYSTEMS, success
 from caldrive.driving.report import Run
-from caldrive.driving.witness import trace_path
+from caldrive.driving.witness import read_trace
 from caldrive.results import InfractionKind
 from caldrive.world.towns import load_town
 
@@ -95,9 +93,9 @@ def _legend(ax: Axes) -> None:
 def traces(run: Run) -> Iterator[dict[str, list[Any]]]:
     """The columns of all episodes whose traces lie in a run's folder."""
     for one in run.driven:
-        path = trace_path(run.folder, one.trial.key)
-        if path.is_file():
-            yield json.loads(gzip.decompress(path.read_bytes()))["trace"]
+        columns = read_trace(run.folder, one.trial.key)
+        if columns is not None:
+            yield columns
 
 
 def errors_figure(runs: Sequence[Run]) -> str:
@@ -136,10 +134,9 @@ def speed_figure(runs: Sequence[Run]) -> str:
     figure = Figure(figsize=(12, 3.2), layout="constrained")
     ax = figure.subplots()
     for k, run in enumerate(runs):
-        path = trace_path(run.folder, longest.trial.key) if longest else run.folder / "none"
-        if longest is None or not path.is_file():
+        columns = read_trace(run.folder, longest.trial.key) if longest else None
+        if columns is None:
             continue
-        columns = json.loads(gzip.decompress(path.read_bytes()))["trace"]
         ax.plot(columns["route_done"], np.array(columns["speed"]) / KMH, color=COLORS[k % len(COLORS)], label=run.name)
         if k == 0:
             ax.step(columns["route_done"], columns["road_limit"], "k--", lw=1, where="post", label="limit on the signs")

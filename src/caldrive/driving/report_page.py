@@ -11,6 +11,7 @@ from caldrive.driving.report import Failure, Run, failures
 from caldrive.driving.report_figures import errors_figure, map_figure, speed_figure, success_figure
 from caldrive.driving.report_tables import Table, tables
 from caldrive.driving.witness import still_paths
+from caldrive.results import Outcome
 
 _DATA = Path(__file__).parent / "data"
 MOST_STILLS = 400  # on one page; beyond that it would take too long to open
@@ -83,7 +84,7 @@ def _card(failure: Failure, stills: Sequence[Path]) -> str:
         for i, before in zip(one.result.infractions, failure.before, strict=True)
     ]
     kinds = {i.kind.value for i in one.result.infractions} | (
-        {"goal missed"} if one.result.outcome.value[:7] != "reached" else set()
+        {"goal missed"} if one.result.outcome is not Outcome.SUCCESS else set()
     )
     data = {
         "run": failure.run, "condition": one.trial.condition, "task": one.trial.scenario.task, "kind": "|".join(kinds)

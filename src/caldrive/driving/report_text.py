@@ -10,13 +10,13 @@ from caldrive.driving.report_tables import tables
 
 def report_text(runs: Sequence[Run]) -> str:
     """The report as Markdown."""
-    parts = ["# Benchmark", ""]
+    parts, found = ["# Benchmark", ""], failures(runs)
     for table in tables(runs):
         parts += [f"## {table.title}", "", table.text, "", "| " + " | ".join(table.head) + " |"]
         parts += ["|" + "---|" * len(table.head), *("| " + " | ".join(row) + " |" for row in table.rows), ""]
-    parts += ["## Failures", "", f"{len(failures(runs))} episodes missed their goal or broke a rule.", ""]
+    parts += ["## Failures", "", f"{len(found)} episodes missed their goal or broke a rule.", ""]
     parts += ["| agent | episode | outcome | infractions | wrong in the 3 s before |", "|---|---|---|---|---|"]
-    for one in failures(runs):
+    for one in found:
         broken = ", ".join(f"{i.kind.value} at {i.time:.1f} s" for i in one.one.result.infractions)
         before = "; ".join(one.before[:3])
         parts.append(f"| {one.run} | {one.one.trial.key} | {one.one.result.outcome.value} | {broken} | {before} |")

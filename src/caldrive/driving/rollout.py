@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 
 from caldrive.datatypes import Scenario, Step
 from caldrive.driving.referee import Referee
 from caldrive.interfaces import Agent, World
-from caldrive.results import EpisodeResult, InfractionKind
+from caldrive.results import EpisodeResult
 
 
 def rollout(world: World, agent: Agent, scenario: Scenario) -> Iterator[Step]:
@@ -25,11 +25,11 @@ def run_episode(
     agent: Agent,
     scenario: Scenario,
     on_step: Callable[[Step], None] | None = None,
-    fatal: Collection[InfractionKind] = (),
+    referee: Referee | None = None,
 ) -> EpisodeResult:
-    """Drive until the goal is reached, time is up or a fatal infraction is committed; on_step sees every step, the last
-    included."""
-    referee = Referee(scenario, fatal)
+    """Drive until the referee ends the episode. on_step sees every step, the last included, after the referee; give the
+    referee to know what it has counted by then, or to have infractions that are fatal."""
+    referee = referee or Referee(scenario)
     for step in rollout(world, agent, scenario):
         outcome = referee.watch(step.truth)
         if on_step is not None:

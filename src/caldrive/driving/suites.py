@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from caldrive.datatypes import Scenario
-from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, scenarios
-from caldrive.episodes import scenario_from_json, scenario_to_json
-from caldrive.results import InfractionKind
+from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, scenarios
+from caldrive.results import EpisodeResult, InfractionKind
+from caldrive.scenarios import scenario_from_json, scenario_to_json
 
 TRAINING_WEATHERS, NEW_WEATHERS = (1, 3, 6, 8), (4, 14)
 CONDITIONS = {
@@ -26,7 +27,7 @@ CONDITIONS = {
 # NoCrash's tasks: cars and people in each town.
 DENSITIES = {
     "empty": {"town01": (0, 0), "town02": (0, 0)},
-    "regular": {"town01": (20, 50), "town02": (15, 50)},
+    "regular": USUAL_TRAFFIC,
     "dense": {"town01": (100, 250), "town02": (70, 150)},
 }
 COLLISIONS = (InfractionKind.COLLISION_CAR, InfractionKind.COLLISION_OBJECT, InfractionKind.COLLISION_PERSON)
@@ -44,6 +45,15 @@ class Trial:
     condition: str
     scenario: Scenario
     fatal: tuple[InfractionKind, ...] = ()
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A trial and how it went. figures: those of `Behaviour`, by name."""
+
+    trial: Trial
+    result: EpisodeResult
+    figures: dict[str, Any]
 
 
 def suite(name: str, seed: int = 0, time_limit: str = "paper") -> list[Trial]:

@@ -9,9 +9,9 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from caldrive.driving.benchmark import Driven
 from caldrive.driving.measures import Cell, cells, rates
 from caldrive.driving.published import success
+from caldrive.driving.suites import Driven
 
 
 def _published(cell: Cell) -> str:

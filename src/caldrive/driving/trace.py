@@ -9,8 +9,8 @@ from typing import Any
 
 from caldrive.config import KMH
 from caldrive.datatypes import Affordances, Step
-from caldrive.episodes import scenario_from_json, scenario_to_json
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
+from caldrive.scenarios import scenario_from_json, scenario_to_json
 
 TRACE_VERSION = 1
 DIGITS = 4

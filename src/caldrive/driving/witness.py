@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import gzip
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import simplejpeg
 
 from caldrive.config import CameraConfig
-from caldrive.datatypes import Image, Scenario, Step
+from caldrive.datatypes import Image, Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.trace import Trace, episode_json
 from caldrive.files import write_whole
@@ -24,25 +26,30 @@ def trace_path(folder: Path, key: str) -> Path:
     return folder / "traces" / f"{key}.json.gz"
 
 
+def read_trace(folder: Path, key: str) -> dict[str, list[Any]] | None:
+    """The columns of an episode's trace, None where it left none."""
+    path = trace_path(folder, key)
+    return dict(json.loads(gzip.decompress(path.read_bytes()))["trace"]) if path.is_file() else None
+
+
 def still_paths(folder: Path, key: str) -> list[Path]:
     """The stills that an episode left, in the order of its infractions; the last one may be its end."""
     return sorted((folder / "stills").glob(f"{key}-[0-9].jpg"))
 
 
 class Witness:
-    """Watches one episode in a world."""
+    """Watches one episode in a world, and its referee."""
 
-    def __init__(self, world: EmbeddedWorld, scenario: Scenario) -> None:
-        self.world, self.trace, self.stills = world, Trace(), list[Image]()
-        self._referee = Referee(scenario)
+    def __init__(self, world: EmbeddedWorld, referee: Referee) -> None:
+        self.world, self.referee, self.trace, self.stills = world, referee, Trace(), list[Image]()
+        self._counted = 0  # infractions so far
 
     def add(self, step: Step) -> None:
         """One more step."""
         self.trace.add(step)
-        before = len(self._referee.infractions)
-        self._referee.watch(step.truth)
-        if len(self._referee.infractions) > before and len(self.stills) < MOST:
+        if len(self.referee.infractions) > self._counted and len(self.stills) < MOST:
             self.stills += self.world.images([STILL])
+        self._counted = len(self.referee.infractions)
 
     def write(self, folder: Path, key: str, result: EpisodeResult) -> None:
         """Trace and stills into a folder."""

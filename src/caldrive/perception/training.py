@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -30,32 +30,13 @@ from caldrive.perception.team import Team, join
 Row = dict[str, float]
 
 
-@dataclass(frozen=True)
-class Files:
-    """What lies in a training's folder."""
+MODEL, STATE, METRICS, CURVES = "model.safetensors", "state.safetensors", "metrics.jsonl", "curves.png"
 
-    folder: Path
 
-    @property
-    def model(self) -> Path:
-        return self.folder / "model.safetensors"
-
-    @property
-    def state(self) -> Path:
-        return self.folder / "state.safetensors"
-
-    @property
-    def metrics(self) -> Path:
-        return self.folder / "metrics.jsonl"
-
-    @property
-    def curves(self) -> Path:
-        return self.folder / "curves.png"
-
-    def rows(self, step: int) -> list[Row]:
-        """Rows of the metrics that a run taken up at this step will not write again."""
-        lines = self.metrics.read_text().splitlines() if self.metrics.is_file() else []
-        return [row for row in map(json.loads, lines) if row["step"] <= step]
+def kept_rows(path: Path, step: int) -> list[Row]:
+    """Rows of the metrics that a run taken up at this step will not write again."""
+    lines = path.read_text().splitlines() if path.is_file() else []
+    return [row for row in map(json.loads, lines) if row["step"] <= step]
 
 
 def start(
@@ -99,7 +80,7 @@ def train(
     TensorBoard is installed it finds them in `out`/tensorboard. `stop` may end the run early after a step. Under
     torchrun the processes share each batch out, and the first one writes.
     """
-    files, perception = Files(Path(out)), perception or PerceptionConfig()
+    out, perception = Path(out), perception or PerceptionConfig()
     team = join(config.device, config.batch)
     size = (perception.image_height, perception.image_width)
     train_episodes, held_episodes = split(
@@ -107,21 +88,21 @@ def train(
     )
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
     run = start(config, perception, frames, imagenet, team)
-    if files.state.is_file():
-        run.restore(files.state)
+    if (out / STATE).is_file():
+        run.restore(out / STATE)
     team.wait()
-    rows, board = files.rows(run.step), Board(files.folder / "tensorboard", team.leads)
+    rows, board = kept_rows(out / METRICS, run.step), Board(out / "tensorboard", team.leads)
     columns: tuple[Any, ...] = (MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
     with Progress(*columns, disable=not (progress and team.leads)) as bar:
         task = bar.add_task("training", total=config.steps, completed=run.step, note="")
         while run.step < config.steps and not stop(run.step):
-            rows.append(_step(run, held, files, rows))
+            rows.append(_step(run, held, out, rows))
             board.add(rows[-1])
             bar.update(task, completed=run.step, note=f"loss {rows[-1]['loss']:.3f}")
-    return files.model
+    return out / MODEL
 
 
-def _step(run: Run, held: Frames, files: Files, rows: list[Row]) -> Row:
+def _step(run: Run, held: Frames, out: Path, rows: list[Row]) -> Row:
     """One step and what belongs after it; returns its row of the metrics."""
     config, began = run.config, time.perf_counter()
     row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": run.advance()}
@@ -129,10 +110,10 @@ def _step(run: Run, held: Frames, files: Files, rows: list[Row]) -> Row:
     last = run.step == config.steps
     if last or run.step % config.evaluate_every == 0:
         if run.team.leads:
-            row |= validate(run, held, files.model)
-            draw_curves([*rows, row], files.curves)
+            row |= validate(run, held, out / MODEL)
+            draw_curves([*rows, row], out / CURVES)
         run.team.wait()
     if run.team.leads and (last or run.step % config.save_every == 0):
-        write_whole(files.metrics, "".join(json.dumps(r) + "\n" for r in [*rows, row]).encode())
-        run.save(files.state)
+        write_whole(out / METRICS, "".join(json.dumps(r) + "\n" for r in [*rows, row]).encode())
+        run.save(out / STATE)
     return row

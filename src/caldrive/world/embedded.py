@@ -122,18 +122,20 @@ class EmbeddedWorld:
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
         """What cameras on the ego see now, (H, W, 3) each."""
-        if self._camera is None:
-            self._camera = Camera(self.roads, self.scenery)
         states = {light.id: light.state for light in self.signals}
-        return self._camera.render(
+        return self._eye().render(
             self.scenario.weather, self.ego, self.vehicles, self.people, states, mounts, self.time
         )
 
     def semantic_images(self, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
         """What each pixel of `images` shows, (H, W) each, as numbers of `semantics.Semantic`."""
+        return self._eye().render_semantics(self.ego, self.vehicles, self.people, mounts)
+
+    def _eye(self) -> Camera:
+        """The town's camera, made when it is first needed."""
         if self._camera is None:
             self._camera = Camera(self.roads, self.scenery)
-        return self._camera.render_semantics(self.ego, self.vehicles, self.people, mounts)
+        return self._camera
 
     def labels_at(self, left: float, yaw: float) -> Affordances:
         """The affordances of a car that stands `left` m beside the ego, turned by `yaw` (the three-camera set-up)."""

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.world import effects, semantics, shaders
+from caldrive.world import effects, semantic_shaders, shaders
 from caldrive.world.textures import texture_layers
 
 
@@ -61,9 +61,9 @@ class SemanticPrograms:
     """The programs that draw classes instead of colours."""
 
     def __init__(self) -> None:
-        self.road = compiled(semantics.ASPHALT_VERTEX, semantics.ASPHALT_FRAGMENT)
-        self.static = compiled(semantics.STANDING_VERTEX, semantics.STANDING_FRAGMENT)
-        self.actor = compiled(semantics.ACTORS_VERTEX, semantics.ACTORS_FRAGMENT)
+        self.road = compiled(shaders.ROAD_VERTEX, semantic_shaders.ROAD_KIND)
+        self.static = compiled(semantic_shaders.STATIC_KIND_VERTEX, semantic_shaders.STATIC_KIND)
+        self.actor = compiled(shaders.ACTOR_VERTEX, semantic_shaders.ACTOR_KIND)
 
 
 @lru_cache(maxsize=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from caldrive.world.semantics import Semantic
+
 BLOCKS = """#version 330 core
 layout(std140) uniform Frame {
     mat4 view_projection;
@@ -31,6 +33,7 @@ vec3 hazy(vec3 color) {
 
 STATIC_VERTEX = (
     BLOCKS
+    + f"const int SIGN = {Semantic.SIGN};"
     + """
 in vec3 position; in vec3 uv; in vec4 normal; in vec4 color;
 out vec3 lit; out vec3 sunlit; out vec3 cell; out vec4 place;
@@ -41,7 +44,7 @@ void main() {
     lit = albedo * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * n.z);
     sunlit = albedo * sun.rgb * max(dot(n, sun_direction.xyz), 0.0);
     cell = uv;
-    if (int(normal.w * 255.0 + 0.5) == 9) {  // signs throw the headlamps' light back
+    if (int(normal.w * 255.0 + 0.5) == SIGN) {  // signs throw the headlamps' light back
         lit = max(lit, 0.80 * albedo);
         sunlit *= 0.4;
     }
