@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.world.actors import car_actors, person_actors
 from caldrive.world.cars import LENGTH, SHAPES, WIDTH, car_mesh, far_car_mesh
+from caldrive.world.decor import TOWNS
 from caldrive.world.ground import KERB_HEIGHT, kerb_mesh, road_mesh
 from caldrive.world.meshes import Mesh, box, disc, lathe, merge, turned
 from caldrive.world.people import HEIGHT, far_person_mesh, person_mesh
@@ -111,10 +112,10 @@ def test_every_metre_of_street_lies_between_centre_line_and_edge(name: str) -> N
 @pytest.mark.parametrize("name", ["town01", "town02"])
 def test_the_asphalt_covers_the_roadway_and_kerbs_stand_beside_it(name: str) -> None:
     roads = load_town(name)
-    asphalt = area_vectors(road_mesh(roads))
+    asphalt = area_vectors(road_mesh(roads, TOWNS["town01"].ground))
     assert (asphalt[:, 2] > 0).all()
     assert 1.0 < asphalt[:, 2].sum() / roads.roadway.area < 1.09  # a little lies under kerbs and strips
-    kerbs = kerb_mesh(roads)
+    kerbs = kerb_mesh(roads, TOWNS["town01"].ground)
     assert kerbs.vertices["position"][:, 2].max() == pytest.approx(KERB_HEIGHT)
     flat = area_vectors(kerbs)[:, 2]
     assert flat[flat > 0].sum() == pytest.approx(roads.roadway.length * SIDEWALK_WIDTH, rel=0.05)

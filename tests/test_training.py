@@ -55,6 +55,16 @@ def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) 
     assert [r["step"] for r in rows[1]] == [1, 2, 3, 4, 5, 6]
 
 
+def test_a_run_may_begin_with_a_trained_network(folder: Path, tmp_path: Path) -> None:
+    first = train(SHORT, folder, tmp_path / "first", TINY, progress=False)
+    still = replace(SHORT, steps=1, learning_rate=0.0, initial=str(first))
+    second = train(still, folder, tmp_path / "second", TINY, progress=False)
+    before, after = (dict(load_network(path)[0].named_parameters()) for path in (first, second))
+    assert torch.equal(before["backbone.stages.0.0.weight"], after["backbone.stages.0.0.weight"])
+    with pytest.raises(CheckpointError, match="other blocks or another size"):
+        train(replace(still, initial=str(first)), folder, tmp_path / "third", replace(TINY, width=0.5), progress=False)
+
+
 def test_a_state_of_other_settings_is_not_taken_up(folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 2)
     with pytest.raises(CheckpointError, match="other settings"):

@@ -114,8 +114,8 @@ class CollectConfig:
     crossing: how much more people cross than usual.
 
     Shares of the episodes: before_signs, before_turns begin before a sign, and before a turn at a junction; displaced
-    begin beside their lane; rearranged have other houses and trees along the streets; hidden_cars have a driver who is
-    told of no car ahead. semantic: a semantic image of each frame.
+    begin beside their lane; rearranged have other houses, trees and colours along the same streets; hidden_cars have a
+    driver who is told of no car ahead. semantic: a semantic image of each frame.
     """
 
     town: str = "town01"
@@ -128,7 +128,7 @@ class CollectConfig:
     before_signs: float = 0.4
     before_turns: float = 0.4
     displaced: float = 0.25
-    rearranged: float = 0.5
+    rearranged: float = 0.7
     hidden_cars: float = 0.1
     width: int = 200
     height: int = 88
@@ -199,7 +199,7 @@ class TrainingConfig:
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
     balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu, cuda, or
-    auto for a GPU where there is one.
+    auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
     """
 
     steps: int = 10_000
@@ -217,6 +217,7 @@ class TrainingConfig:
     cache_gb: float = 4.0
     precision: str = "auto"
     device: str = "auto"
+    initial: str | None = None
     seed: int = 0
 
 

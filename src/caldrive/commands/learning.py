@@ -62,8 +62,12 @@ class Train(TrainSettings, Output):
         require_writable_folder(self.out)
         if self.preset not in TRAININGS:
             raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
-        config = replace(TRAININGS[self.preset], seed=self.seed, device=self.device)
-        config = config if self.steps is None else replace(config, steps=self.steps)
+        config = TRAININGS[self.preset]
+        config = replace(
+            config, seed=self.seed, device=self.device, initial=str(self.initial) if self.initial else None,
+            steps=config.steps if self.steps is None else self.steps,
+            learning_rate=config.learning_rate if self.rate is None else self.rate,
+        )  # fmt: skip
         imagenet = self.imagenet or (imagenet_file() if PERCEPTIONS[self.preset].width == 1.0 else None)
         model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
         return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")

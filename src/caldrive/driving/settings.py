@@ -167,6 +167,10 @@ class TrainSettings:
     """small, for two cores, or paper: full width, from VGG16's ImageNet weights."""
     imagenet: Path | None = None
     """VGG16's weights for preset paper (.safetensors or .pth); without it those in torch.hub's cache."""
+    initial: Path | None = None
+    """A trained network (.safetensors) of the same preset to begin with, instead of a new one."""
+    rate: float | None = None
+    """Base learning rate, where the preset's is not wanted."""
     device: str = "auto"
     """cpu, cuda, or auto for a GPU where there is one; torchrun trains on several."""
     seed: int = 0

@@ -16,7 +16,7 @@ from torch.optim import Adam
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
 from caldrive.perception.calibration import calibrated
-from caldrive.perception.checkpoint import CheckpointInfo, round_to_half, save_network
+from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
 from caldrive.perception.curves import Board, draw_curves
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
@@ -39,12 +39,20 @@ def kept_rows(path: Path, step: int) -> list[Row]:
     return [row for row in map(json.loads, lines) if row["step"] <= step]
 
 
+def _initial(path: str, perception: PerceptionConfig) -> Network:
+    """A trained network to begin with. Raises CheckpointError where it is not built as wanted."""
+    network, info = load_network(path)
+    if info.config != perception:
+        raise CheckpointError(f"{path} is a network with other blocks or another size than wanted: give its --preset")
+    return network
+
+
 def start(
     config: TrainingConfig, perception: PerceptionConfig, frames: Frames, imagenet: Path | None, team: Team
 ) -> Run:
     """A run at its first step."""
     torch.manual_seed(config.seed)
-    network = Network(perception)
+    network = Network(perception) if config.initial is None else _initial(config.initial, perception)
     if imagenet is not None:
         network.backbone.load_imagenet(imagenet)
     network = network.to(team.device)

@@ -10,6 +10,7 @@ import numpy as np
 
 from caldrive.world.actors import INSTANCE, Instances
 from caldrive.world.buildings import building_meshes
+from caldrive.world.decor import Decor
 from caldrive.world.furniture import furniture_meshes
 from caldrive.world.gl import Programs, SemanticPrograms, gl_context, programs, semantic_programs
 from caldrive.world.ground import KERB_HEIGHT, far_kerb_mesh, kerb_mesh, road_mesh, yard_mesh
@@ -86,16 +87,16 @@ class Crowd:
             (self.semantic if semantic else self.array).render(instances=n)
 
 
-def town_batches(roads: RoadNetwork, scenery: Sequence[Prop]) -> tuple[TownBatch, TownBatch]:
+def town_batches(roads: RoadNetwork, scenery: Sequence[Prop], decor: Decor) -> tuple[TownBatch, TownBatch]:
     """A town's asphalt, and everything else that stands still."""
-    houses = classed_detail(building_meshes(scenery, roads.style), Semantic.BUILDING)
-    furniture = furniture_meshes(scenery, roads.style, KERB_HEIGHT)
-    asphalt = Tiles([(road_mesh(roads), Level.ALWAYS)])
+    houses = classed_detail(building_meshes(scenery, decor), Semantic.BUILDING)
+    furniture = furniture_meshes(scenery, decor, KERB_HEIGHT)
+    asphalt = Tiles([(road_mesh(roads, decor.ground), Level.ALWAYS)])
     standing = Tiles([
         (houses.always, Level.ALWAYS), (houses.near, Level.NEAR), (houses.far, Level.FAR),
         (furniture.always, Level.ALWAYS), (furniture.near, Level.NEAR), (furniture.far, Level.FAR),
-        (classed(kerb_mesh(roads), Semantic.SIDEWALK), Level.NEAR),
-        (classed(far_kerb_mesh(roads), Semantic.SIDEWALK), Level.ALWAYS),
-        (classed(yard_mesh(roads), Semantic.GROUND), Level.ALWAYS),
+        (classed(kerb_mesh(roads, decor.ground), Semantic.SIDEWALK), Level.NEAR),
+        (classed(far_kerb_mesh(roads, decor.ground), Semantic.SIDEWALK), Level.ALWAYS),
+        (classed(yard_mesh(roads, decor.ground), Semantic.GROUND), Level.ALWAYS),
     ])  # fmt: skip
     return TownBatch(asphalt, "road"), TownBatch(standing, "static")

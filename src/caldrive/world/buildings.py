@@ -3,53 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
 from caldrive.geometry import box_corners
-from caldrive.world.meshes import RGB, Detail, Mesh, merge, quads
-from caldrive.world.scenery import STYLES, Prop
+from caldrive.world.decor import Decor, Design
+from caldrive.world.meshes import Detail, Mesh, merge, quads
+from caldrive.world.scenery import Prop
 from caldrive.world.textures import Tex
 
 BAY = 5.6  # m of façade in one layer: two bays upstairs, four half-width ones on the ground floor
 EAVES = 0.35
 FULL = 255  # vertices of walls look up shadows of buildings only, a little in front of themselves
-
-
-@dataclass(frozen=True)
-class Design:
-    """One type of building: layers of the upper floors and the ground floor, tints, and the roof's rise in metres."""
-
-    upper: Tex
-    ground: Tex
-    tint: RGB
-    base: RGB
-    roof: Tex
-    roof_tint: RGB
-    rise: float
-
-
-DESIGNS = {
-    "town01": (
-        Design(Tex.SASH, Tex.HALL, (244, 222, 170), (226, 214, 196), Tex.TILES, (196, 96, 70), 2.6),
-        Design(Tex.PANE, Tex.SHOP, (236, 190, 164), (240, 226, 214), Tex.TILES, (176, 84, 64), 2.2),
-        Design(Tex.BALCONY, Tex.SHOP, (240, 236, 226), (230, 226, 222), Tex.TILES, (150, 78, 62), 2.4),
-        Design(Tex.SASH, Tex.SHOP, (206, 218, 206), (226, 230, 222), Tex.TILES, (120, 92, 84), 2.8),
-        Design(Tex.PANE, Tex.HALL, (214, 168, 140), (206, 196, 184), Tex.TILES, (188, 92, 66), 3.0),
-        Design(Tex.BALCONY, Tex.HALL, (190, 206, 222), (218, 218, 218), Tex.TILES, (132, 76, 66), 2.2),
-    ),
-    "town02": (
-        Design(Tex.GLASS, Tex.LOBBY, (226, 240, 250), (236, 240, 244), Tex.PLAIN, (132, 134, 138), 0.0),
-        Design(Tex.BAND, Tex.LOBBY, (214, 212, 206), (232, 232, 232), Tex.PLAIN, (120, 120, 122), 0.0),
-        Design(Tex.LOFT, Tex.DOCK, (178, 104, 84), (206, 190, 180), Tex.PLAIN, (110, 100, 96), 0.0),
-        Design(Tex.BAND, Tex.DOCK, (160, 172, 178), (214, 214, 212), Tex.PLAIN, (96, 100, 104), 0.0),
-        Design(Tex.LOFT, Tex.LOBBY, (148, 128, 118), (214, 210, 206), Tex.PLAIN, (92, 90, 90), 0.0),
-        Design(Tex.GLASS, Tex.DOCK, (206, 216, 206), (200, 204, 200), Tex.PLAIN, (128, 130, 128), 0.0),
-    ),
-}
 
 
 def _walls(
@@ -101,16 +68,16 @@ def _eaves(corners: NDArray[np.float64], height: NDArray[np.float64], designs: S
     return _walls(out, height - 0.3, height + 0.02, plain, tint.astype(int), np.ones(len(corners)))
 
 
-def building_meshes(props: Sequence[Prop], style: str) -> Detail:
+def building_meshes(props: Sequence[Prop], decor: Decor) -> Detail:
     """All buildings among the props; from afar their ground floors look like the others."""
     houses = [p for p in props if p.kind == "building"]
     if not houses:
         return Detail()
-    designs = [DESIGNS[style][p.variant] for p in houses]
+    designs = [decor.designs[p.variant] for p in houses]
     # from front right counter-clockwise, so that the walls look outwards
     footprints: list[Points] = [np.roll(box_corners(p.pose, p.length, p.width), 1, axis=0) for p in houses]
     corners, height = np.array(footprints), np.array([p.height for p in houses])
-    floor = STYLES[style].floor
+    floor = decor.style.floor
     low, first = np.full(len(houses), -0.06), np.full(len(houses), floor)
     upper = _looks(designs, "upper", "tint")
     ground_floor = _walls(corners, low, first, *_looks(designs, "ground", "base"), np.ones(len(houses)))

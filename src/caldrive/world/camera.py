@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.world.actors import Actors, car_actors, person_actors
-from caldrive.world.atmosphere import PAINT, Atmosphere
+from caldrive.world.atmosphere import Atmosphere
 from caldrive.world.batches import Crowd, TownBatch, town_batches, vertex_array
 from caldrive.world.cars import SHAPES, car_mesh, far_car_mesh
+from caldrive.world.decor import TOWNS, Decor
 from caldrive.world.gl import Target, gl_context, programs, semantic_programs
 from caldrive.world.optics import Lens, mounted
 from caldrive.world.overlays import Overlays
@@ -33,17 +34,21 @@ SHARP = 100.0  # px, the focal length of a small picture (200 x 88 at 90 degrees
 
 
 class Camera:
-    """Draws one town. samples: of antialiasing for pictures that people look at; it more than doubles the time."""
+    """Draws one town. decor: without it the town's own. samples: of antialiasing for pictures that people look at; it
+    more than doubles the time."""
 
-    def __init__(self, roads: RoadNetwork, scenery: tuple[Prop, ...], samples: int = 0) -> None:
+    def __init__(
+        self, roads: RoadNetwork, scenery: tuple[Prop, ...], decor: Decor | None = None, samples: int = 0
+    ) -> None:
+        decor = decor or TOWNS[roads.style]
         gl, made, dome = gl_context(), programs(), dome_mesh()
         self.samples = samples
-        self._batches: tuple[TownBatch, ...] = town_batches(roads, scenery)
+        self._batches: tuple[TownBatch, ...] = town_batches(roads, scenery, decor)
         self._cars = [Crowd(make(shape)) for shape in SHAPES for make in (car_mesh, far_car_mesh)]
         self._people = [Crowd(person_mesh()), Crowd(far_person_mesh())]
         data, index = gl.buffer(dome.vertices.tobytes()), gl.buffer(dome.triangles.tobytes())
         self._dome = vertex_array(made.sky, data, index)
-        self._atmosphere, self._overlays = Atmosphere(roads, scenery), Overlays(roads.posts)
+        self._atmosphere, self._overlays = Atmosphere(roads, scenery, decor), Overlays(roads.posts)
         self._sight = Sight(scenery)
         self._targets: dict[tuple[tuple[int, int], int], Target] = {}
 
@@ -94,7 +99,7 @@ class Camera:
     ) -> list[NDArray[np.uint8]]:  # fmt: skip
         """What each pixel of `render`'s pictures shows, (H, W) for each mount, as numbers of `Semantic`."""
         made = semantic_programs()
-        made.road["widths"] = PAINT[self._atmosphere.roads.style][-1]
+        made.road["widths"] = self._atmosphere.decor.paint.stripes
         cars, people = car_actors(vehicles), person_actors(pedestrians)
         images = []
         for lens in (mounted(ego, mount) for mount in mounts):

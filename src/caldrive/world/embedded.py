@@ -30,6 +30,7 @@ from caldrive.world.contacts import Obstacle, obstacle_of, resolve
 from caldrive.world.labels import label
 from caldrive.world.lights import Lights
 from caldrive.world.pedestrians import Pedestrians
+from caldrive.world.redecoration import redecorated
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.route import Route, plan_route
 from caldrive.world.scenery import build_scenery
@@ -109,7 +110,7 @@ class EmbeddedWorld:
     def enter(self, town: str, arrangement: int = 0) -> RoadNetwork:
         """Loads a town, if it is not the one already there, without starting an episode.
 
-        arrangement: of its houses and trees, 0 for the town as it is.
+        arrangement: of its houses, trees and colours, 0 for the town as it is.
         """
         if self._town != (town, arrangement):
             self._load(town, arrangement)
@@ -134,7 +135,7 @@ class EmbeddedWorld:
     def _eye(self) -> Camera:
         """The town's camera, made when it is first needed."""
         if self._camera is None:
-            self._camera = Camera(self.roads, self.scenery)
+            self._camera = Camera(self.roads, self.scenery, self._decor)
         return self._camera
 
     def labels_at(self, left: float, yaw: float) -> Affordances:
@@ -145,6 +146,7 @@ class EmbeddedWorld:
     def _load(self, town: str, arrangement: int) -> None:
         self.roads = load_town(town)
         self.scenery = build_scenery(self.roads, arrangement)
+        self._decor = redecorated(self.roads.style, arrangement)
         self.surface = Surface(self.roads)
         solid = [prop for prop in self.scenery if prop.solid]
         self._solid = [

@@ -157,3 +157,18 @@ def dock(rng: np.random.Generator) -> Layer:
             f.fill((x + 0.015, j * 0.11, x + 0.285, j * 0.11 + 0.095), gate)
         f.window((x + 0.345, 0.34, x + 0.42, 0.76), 0)
     return flipped(f.picture)
+
+
+def invented(rng: np.random.Generator) -> Layer:
+    """Windows of any size in any grid, sometimes with bands or piers between them."""
+    f = _Facade((226, 224, 222), rng, float(rng.uniform(0.02, 0.10)))
+    columns, rows = int(rng.integers(1, 7)), 2 * int(rng.integers(1, 3))
+    wide, high, sill = rng.uniform(0.3, 0.95), rng.uniform(0.3, 0.9), rng.uniform(0.0, 0.3)
+    glass, frame = (tuple(int(v) for v in rng.uniform(low, high, 3)) for low, high in ((40, 150), (120, 250)))
+    for x in np.arange(columns) / columns:
+        for y in np.arange(rows) / rows:
+            left, bottom = float(x + (1 - wide) / 2 / columns), float(y + sill * (1 - high) / rows)
+            right, top = float(left + wide / columns), float(bottom + high / rows)
+            f.fill((left - 0.015, bottom - 0.015, right + 0.015, top + 0.015), (frame[0], frame[1], frame[2]))
+            f.fill((left, bottom, right, top), (glass[0], glass[1], glass[2]))
+    return flipped(f.picture)

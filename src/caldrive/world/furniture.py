@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from caldrive.world.decor import Crown, Decor
 from caldrive.world.meshes import RGB, Detail, Mesh, box, disc, lathe, merge, packed, quads, smooth
 from caldrive.world.scenery import Prop
 from caldrive.world.semantics import PROP_CLASSES, Semantic, classed_detail
@@ -66,34 +67,18 @@ def _crown(profile: Sequence[tuple[float, float]], color: RGB, layer: Tex, n: in
     return smooth(_uneven(made, dents), (0, 0, middle - 0.4), 0.8)
 
 
-_GREEN_BARK, _DARK_BARK = (104, 84, 66), (84, 66, 54)
-_CROWNS: dict[tuple[str, int], tuple[tuple[tuple[float, float], ...], RGB, Tex, RGB]] = {
-    ("town01", 0): (
-        ((0.3, 2.3), (1.5, 3.1), (1.75, 4.3), (1.1, 5.5), (0.0, 6.0)), (98, 142, 62), Tex.LEAVES, _GREEN_BARK),
-    ("town01", 1): (
-        ((0.4, 2.5), (1.2, 3.0), (1.55, 4.0), (1.2, 5.2), (0.0, 5.9)), (126, 158, 70), Tex.LEAVES, (112, 94, 76)),
-    ("town01", 2): (
-        ((0.2, 1.9), (0.75, 2.7), (0.95, 4.0), (0.6, 5.4), (0.0, 6.2)), (82, 126, 64), Tex.LEAVES, _GREEN_BARK),
-    ("town02", 0): (
-        ((0.2, 1.5), (1.35, 1.9), (0.95, 3.4), (0.5, 4.8), (0.0, 6.0)), (58, 98, 78), Tex.NEEDLES, _DARK_BARK),
-    ("town02", 1): (
-        ((0.2, 1.2), (1.0, 1.7), (0.75, 3.4), (0.4, 5.0), (0.0, 6.2)), (70, 110, 80), Tex.NEEDLES, _DARK_BARK),
-    ("town02", 2): (
-        ((0.3, 2.6), (1.2, 3.1), (1.4, 4.2), (0.9, 5.3), (0.0, 5.8)), (206, 142, 58), Tex.LEAVES, (196, 190, 180)),
-}  # fmt: skip
-
-
-def _tree(style: str, variant: int) -> Detail:
-    profile, color, layer, bark = _CROWNS[style, variant]
-    trunk = lathe(((0.17, -0.06), (0.12, profile[1][1])), 3, bark, spare=255)
-    dents = 0.10 if layer is Tex.LEAVES else 0.0
-    rough = (profile[0], profile[2] if layer is Tex.LEAVES else profile[1], profile[-1])
+def _tree(crown: Crown) -> Detail:
+    profile, color, layer = crown.profile, crown.color, crown.layer
+    trunk = lathe(((0.17, -0.06), (0.12, profile[1][1])), 3, crown.bark, spare=255)
+    dents = 0.0 if layer is Tex.NEEDLES else 0.10
+    rough = (profile[0], profile[1] if layer is Tex.NEEDLES else profile[2], profile[-1])
     return Detail(trunk, _crown(profile, color, layer, 7, dents), _crown(rough, color, layer, 4, 0.0))
 
 
-def _lamp(style: str) -> Detail:
-    if style == "town02":
-        arm = box((0.9, 0, 6.0), (1.9, 0.22, 0.1), (70, 74, 80))
+def _lamp(reach: float) -> Detail:
+    """A lamp on an arm, or a lantern where the arm has no length."""
+    if reach > 0:
+        arm = box((reach, 0, 6.0), (2 * reach + 0.1, 0.22, 0.1), (70, 74, 80))
         return Detail(_pole(6.0, 0.07, (70, 74, 80), 3), arm, arm)
     lantern = lathe(((0.09, 4.0), (0.24, 4.5), (0.0, 4.8)), 5, (52, 60, 54))
     return Detail(_pole(4.0, 0.06, (52, 60, 54), 3), lantern, lathe(((0.09, 4.0), (0.24, 4.5)), 3, (52, 60, 54)))
@@ -115,7 +100,7 @@ def _billboard(variant: int) -> Detail:
     return Detail(merge((quads(panel, (255, 255, 255), uv), box((0, 0, 2.9), (0.2, 4.6, 3.0), frame), *legs)))
 
 
-def _template(kind: str, variant: int, label: int, style: str) -> Detail:
+def _template(kind: str, variant: int, label: int, decor: Decor) -> Detail:
     hues: tuple[RGB, ...] = ((168, 60, 48), (52, 92, 140), (214, 170, 62), (74, 124, 82))
     hue = hues[variant % 4]
     if kind == "light_post":
@@ -123,23 +108,15 @@ def _template(kind: str, variant: int, label: int, style: str) -> Detail:
     if kind == "sign_post":
         return _sign_post(label)
     if kind == "tree":
-        return _tree(style, variant)
+        return _tree(decor.crowns[variant])
     if kind == "lamp":
-        return _lamp(style)
+        return _lamp(decor.arm)
     if kind == "billboard":
         return _billboard(variant)
     if kind == "hedge":
         return Detail(box((0, 0, 0.62), (0.9, 7.0, 1.36), (86, 122, 62), Tex.LEAVES, 2.0))
     if kind == "fence":
-        return Detail(
-            box(
-                (0, 0, 0.7),
-                (0.08, 8.0, 1.5),
-                (206, 196, 176) if style == "town01" else (120, 124, 128),
-                Tex.BRICKS,
-                3.0,
-            )
-        )
+        return Detail(box((0, 0, 0.7), (0.08, 8.0, 1.5), decor.fence, Tex.BRICKS, 3.0))
     if kind == "wall":
         return Detail(box((0, 0, 0.95), (0.3, 8.0, 2.0), (176, 160, 150), Tex.BRICKS, 2.4))
     if kind == "container":
@@ -170,7 +147,7 @@ def copies(mesh: Mesh, props: Sequence[Prop], foot: float, scales: Sequence[floa
     return Mesh(made.reshape(-1), triangles.reshape(-1, 3), np.repeat(at[:, :2], len(mesh.triangles), axis=0))
 
 
-def furniture_meshes(props: Sequence[Prop], style: str, foot: float) -> Detail:
+def furniture_meshes(props: Sequence[Prop], decor: Decor, foot: float) -> Detail:
     """Everything but buildings, as three meshes: drawn always, from near, from afar. foot: height of the ground (m)."""
     groups: defaultdict[tuple[str, int, int], list[Prop]] = defaultdict(list)
     for prop in props:
@@ -178,7 +155,7 @@ def furniture_meshes(props: Sequence[Prop], style: str, foot: float) -> Detail:
             groups[prop.kind, prop.variant, prop.label].append(prop)
     always, near, far = list[Mesh](), list[Mesh](), list[Mesh]()
     for (kind, variant, label), members in groups.items():
-        detail = classed_detail(_template(kind, variant, label, style), PROP_CLASSES.get(kind, Semantic.FURNITURE))
+        detail = classed_detail(_template(kind, variant, label, decor), PROP_CLASSES.get(kind, Semantic.FURNITURE))
         scales = [p.height / TREE_HEIGHT if kind == "tree" else 1.0 for p in members]
         for found, mesh in ((always, detail.always), (near, detail.near), (far, detail.far)):
             if len(mesh.triangles):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
 from caldrive.geometry import Polyline
+from caldrive.world.decor import Ground
 from caldrive.world.meshes import RGB, VERTEX, Mesh, merge, packed, quads
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.streets import Border, Chain, chains
@@ -31,22 +31,6 @@ SOLID = 4  # a centre line near a junction
 YARD_LEVEL = -0.05
 FAR_AWAY = 900.0  # m to a stop line where there is none
 LONGEST = 24.0  # m of one piece of ground, so that what lies out of sight is left out
-
-
-@dataclass(frozen=True)
-class GroundStyle:
-    """Colours and layers of the ground: (layer, tint, metres of one tile). dash: metres of one dash and one gap."""
-
-    dash: float
-    kerb: RGB
-    pavement: tuple[Tex, RGB, float]
-    yard: tuple[Tex, RGB, float]
-
-
-GROUND_STYLES = {
-    "town01": GroundStyle(6.0, (204, 202, 196), (Tex.SLABS, (214, 212, 208), 2.4), (Tex.GRASS, (235, 240, 225), 7.0)),
-    "town02": GroundStyle(4.5, (178, 172, 168), (Tex.BRICKS, (200, 148, 128), 1.6), (Tex.GRAVEL, (235, 230, 220), 9.0)),
-}
 
 
 def _normals(points: Points) -> Points:
@@ -111,11 +95,10 @@ def _junctions(roads: RoadNetwork, streets: list[Chain]) -> Mesh:
     return Mesh(made, np.arange(len(ring), dtype=np.uint32).reshape(-1, 3))
 
 
-def road_mesh(roads: RoadNetwork) -> Mesh:
+def road_mesh(roads: RoadNetwork, ground: Ground) -> Mesh:
     """All asphalt, for the road shader."""
     streets = chains(roads)
-    dash = GROUND_STYLES[roads.style].dash
-    return merge((*(_strip(c, dash) for c in streets), _junctions(roads, streets)))
+    return merge((*(_strip(c, ground.dash) for c in streets), _junctions(roads, streets)))
 
 
 def _bands(ring: shapely.LinearRing, lines: Sequence[tuple[float, float]], looks: Sequence[Look], tile: float) -> Mesh:
@@ -138,25 +121,24 @@ def _edges(roads: RoadNetwork, tolerance: float) -> list[shapely.LinearRing]:
     return [ring for p in shapely.get_parts(area) for ring in (p.exterior, *p.interiors)]
 
 
-def kerb_mesh(roads: RoadNetwork) -> Mesh:
+def kerb_mesh(roads: RoadNetwork, ground: Ground) -> Mesh:
     """Kerbs and sidewalks as seen from near."""
-    style = GROUND_STYLES[roads.style]
-    layer, tint, tile = style.pavement
+    layer, tint, tile = ground.pavement
     lines = ((0.0, -0.02), (0.0, KERB_HEIGHT), (KERB_WIDTH, KERB_HEIGHT), (SIDEWALK_WIDTH, KERB_HEIGHT))
-    looks = ((style.kerb, Tex.PLAIN), (style.kerb, Tex.PLAIN), (tint, layer))
+    looks = ((ground.kerb, Tex.PLAIN), (ground.kerb, Tex.PLAIN), (tint, layer))
     return merge([_bands(ring, lines, looks, tile) for ring in _edges(roads, 0.02)])
 
 
-def far_kerb_mesh(roads: RoadNetwork) -> Mesh:
+def far_kerb_mesh(roads: RoadNetwork, ground: Ground) -> Mesh:
     """The same as seen from afar: one slope, so low that kerbs and sidewalks lie on it where they are drawn."""
-    layer, tint, tile = GROUND_STYLES[roads.style].pavement
+    layer, tint, tile = ground.pavement
     lines = ((0.0, -0.015), (SIDEWALK_WIDTH, KERB_HEIGHT - 0.03))
     return merge([_bands(ring, lines, ((tint, layer),), tile) for ring in _edges(roads, 0.2)])
 
 
-def yard_mesh(roads: RoadNetwork, margin: float = 600.0) -> Mesh:
+def yard_mesh(roads: RoadNetwork, ground: Ground, margin: float = 600.0) -> Mesh:
     """One wide plane a little below the road."""
-    layer, tint, tile = GROUND_STYLES[roads.style].yard
+    layer, tint, tile = ground.yard
     x0, y0, x1, y1 = np.add(roads.bounds, (-margin, -margin, margin, margin))
     corners = np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]])
     uv = np.concatenate((corners / tile, np.full((1, 4, 1), float(layer))), axis=2)

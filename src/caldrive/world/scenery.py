@@ -15,6 +15,8 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
+from caldrive.world.decor import Style
+from caldrive.world.redecoration import N_DESIGNS, redecorated
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 
 SETBACK = 1.4  # m from the sidewalk to a façade
@@ -45,27 +47,6 @@ class Prop:
     solid: bool = True
 
 
-@dataclass(frozen=True)
-class Style:
-    """What lines the streets. frontage, depth, tree_gap, tree_height: least and most metres. gap: share of plots."""
-
-    buildings: int
-    frontage: tuple[float, float]
-    depth: tuple[float, float]
-    floors: tuple[int, int]
-    floor: float
-    gap: float
-    tree_gap: tuple[float, float]
-    tree_height: tuple[float, float]
-    in_gaps: tuple[str, ...]
-
-
-STYLES = {
-    "town01": Style(
-        6, (9, 16), (9, 12), (2, 4), 3.1, 0.15, (9, 20), (5.0, 7.5), ("hedge", "hedge", "billboard", "fence")),
-    "town02": Style(
-        6, (12, 24), (10, 14), (2, 6), 3.4, 0.25, (12, 28), (6.0, 9.0), ("fence", "container", "billboard", "wall")),
-}  # fmt: skip
 _SIZES = {  # length (towards the road), width, height in metres
     "lamp": (0.2, 0.2, 6.2), "bin": (0.45, 0.45, 0.95), "bench": (0.55, 1.7, 0.85), "hydrant": (0.3, 0.3, 0.75),
     "box": (0.5, 0.9, 1.25), "hedge": (0.9, 7.0, 1.3), "fence": (0.15, 8.0, 1.5), "wall": (0.3, 8.0, 2.0),
@@ -145,7 +126,7 @@ def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> It
     n = len(frontage)
     width, depth = frontage - rng.uniform(0.1, 0.9, n), rng.uniform(*style.depth, n)
     built = rng.random(n) >= style.gap
-    floors, variant = rng.integers(style.floors[0], style.floors[1] + 1, n), rng.integers(style.buildings, size=n)
+    floors, variant = rng.integers(style.floors[0], style.floors[1] + 1, n), rng.integers(N_DESIGNS, size=n)
     keep_off = roads.roadway.buffer(SIDEWALK_WIDTH + 1.0)
     shapely.prepare(keep_off)
     center, fits = np.zeros((n, 2)), np.zeros(n, dtype=bool)
@@ -234,7 +215,7 @@ def build_scenery(roads: RoadNetwork, arrangement: int = 0) -> tuple[Prop, ...]:
     arrangement: 0 is the town as it is; others have the same streets and posts among other houses and trees.
     """
     rng = np.random.default_rng([zlib.crc32(roads.name.encode()), *([arrangement] if arrangement else [])])
-    style = STYLES[roads.style]
+    style = redecorated(roads.style, arrangement).style
     posts = tuple(_posts(roads))
     buildings = tuple(_buildings(roads, style, rng))
     trees = tuple(_trees(roads, style, posts, rng))

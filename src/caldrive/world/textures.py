@@ -39,6 +39,16 @@ class Tex(IntEnum):
     SIGN_90 = 21
     POSTER_A = 22
     POSTER_B = 23
+    PLATES = 24
+    SETTS = 25
+    PLANKS = 26
+    CONCRETE = 27
+    INVENTED_A = 28  # façades of nowhere, for decors made up at random
+    INVENTED_B = 29
+    INVENTED_C = 30
+    INVENTED_D = 31
+    INVENTED_E = 32
+    INVENTED_F = 33
 
 
 SIGN_LAYERS = {30: Tex.SIGN_30, 60: Tex.SIGN_60, 90: Tex.SIGN_90}
@@ -78,7 +88,7 @@ def _poster(ground: RGB, mark: RGB, word: str) -> Layer:
 
 
 def texture_layers() -> NDArray[np.uint8]:
-    """All layers (24, SIZE, SIZE, 3), bottom row first, in the order of `Tex`."""
+    """All layers (34, SIZE, SIZE, 3), bottom row first, in the order of `Tex`."""
     rng = np.random.default_rng(20180614)
     plain = np.full((SIZE, SIZE, 3), 255, np.uint8)
     layers = {
@@ -95,5 +105,10 @@ def texture_layers() -> NDArray[np.uint8]:
         **{layer: _sign(limit) for limit, layer in SIGN_LAYERS.items()},
         Tex.POSTER_A: _poster((222, 176, 58), (60, 44, 40), "JAZZ"),
         Tex.POSTER_B: _poster((58, 110, 128), (238, 236, 220), "EXPO"),
+        Tex.PLATES: paving((214, 212, 208), 0.8, 2, 2, rng),
+        Tex.SETTS: paving((206, 204, 200), 0.6, 10, 10, rng),
+        Tex.PLANKS: paving((212, 206, 198), 0.7, 12, 1, rng),
+        Tex.CONCRETE: speckled((206, 204, 202), rng, 0.05, 0.16, 4),
+        **{layer: facades.invented(rng) for layer in Tex if layer.name.startswith("INVENTED")},
     }
     return np.stack([layers[t] for t in Tex])
