@@ -98,3 +98,20 @@ def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:
     assert found["agent"] == "oracle"
     assert found["cap"] == 20.0
     assert found["code"] == runner.code_version()
+
+
+def test_a_worker_with_other_code_is_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    drive = runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, "other")
+    with pytest.raises(ValueError, match="install the same caldrive on all machines"):
+        runner._keep(tmp_path, drive)
+    assert not list(tmp_path.iterdir())
+
+
+def test_files_are_there_before_their_line(
+    whole: BenchmarkSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "_append", lambda path, line: pytest.fail("was killed before the line"))
+    with pytest.raises(pytest.fail.Exception):
+        runner._keep(tmp_path, runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, runner.code_version()))
+    assert (tmp_path / "traces" / "a.json.gz").read_bytes() == b"x"
+    assert read_lines(tmp_path / "results.jsonl") == {}

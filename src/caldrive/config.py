@@ -212,7 +212,7 @@ class TrainingConfig:
     balance: float = 0.5
     augment: bool = True
     validation_share: float = 0.05
-    evaluate_every: int = 400
+    evaluate_every: int = 1000
     save_every: int = 100
     cache_gb: float = 4.0
     precision: str = "auto"

@@ -10,7 +10,8 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache, partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Any
 
 from caldrive.datatypes import Step
 from caldrive.driving.behaviour import Behaviour
+from caldrive.driving.cluster import spread_over_cluster
 from caldrive.driving.drivers import model_path, set_up
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.pool import spread
@@ -33,6 +35,7 @@ PACKAGE = Path(__file__).parents[1]
 RESULTS, RUN = "results.jsonl", "run.json"
 
 
+@lru_cache(maxsize=1)
 def code_version() -> str:
     """Tells this code from any other: a digest of all sources and data of the package, its models left aside."""
     digest = hashlib.sha256()
@@ -120,8 +123,17 @@ def _set_up(driver: DriverSettings) -> Any:
     return set_up(driver)
 
 
-def drive_trial(driver: DriverSettings, folder: Path, trial: Trial) -> dict[str, Any]:
-    """Drives one trial; leaves its trace and stills in a folder and returns its line."""
+@dataclass(frozen=True)
+class Drive:
+    """What a worker sends back of a trial: its line, its files by their names, and the version of the code it ran."""
+
+    line: dict[str, Any]
+    files: dict[str, bytes]
+    code: str
+
+
+def drive_trial(driver: DriverSettings, trial: Trial) -> Drive:
+    """Drives one trial."""
     world, agent = _set_up(driver)
     referee = Referee(trial.scenario, trial.fatal)
     behaviour, witness = Behaviour(), Witness(world, referee)
@@ -131,9 +143,9 @@ def drive_trial(driver: DriverSettings, folder: Path, trial: Trial) -> dict[str,
         witness.add(step)
 
     result = run_episode(world, agent, trial.scenario, watch, referee)
-    witness.write(folder, trial.key, result)
-    figures = behaviour.figures(result.infractions)
-    return {"key": trial.key, "result": result_values(result), "figures": {k: plain(v) for k, v in figures.items()}}
+    figures = {name: plain(value) for name, value in behaviour.figures(result.infractions).items()}
+    line = {"key": trial.key, "result": result_values(result), "figures": figures}
+    return Drive(line, witness.files(trial.key, result), code_version())
 
 
 def read_results(settings: BenchmarkSettings) -> list[Driven]:
@@ -150,7 +162,7 @@ def read_results(settings: BenchmarkSettings) -> list[Driven]:
 def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     """Drives the trials that a folder lacks; yields how many are done, of how many, and whether the last one succeeded.
 
-    Raises ValueError where the folder belongs to another run, RuntimeError where workers keep dying.
+    Raises ValueError where the folder belongs to another run, RuntimeError where workers keep dying or Ray is missing.
     """
     if settings.workers < 1:
         raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
@@ -159,11 +171,30 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     driver = DriverSettings(agent=settings.agent, model=settings.model, preset=settings.preset, cap=cap)
     require_writable_folder(settings.out)
     _claim(settings)
-    path = settings.out / RESULTS
-    known = read_lines(path)
+    known = read_lines(settings.out / RESULTS)
     missing = [trial for trial in trials if trial.key not in known]
     done = len(trials) - len(missing)
-    for _, line in spread(partial(drive_trial, driver, settings.out), missing, settings.workers):
-        _append(path, line)
+    for _, drive in _workers(settings, partial(drive_trial, driver), missing):
+        _keep(settings.out, drive)
         done += 1
-        yield done, len(trials), line["result"]["outcome"] == "success"
+        yield done, len(trials), drive.line["result"]["outcome"] == "success"
+
+
+def _workers(
+    settings: BenchmarkSettings, work: Callable[[Trial], Drive], trials: list[Trial]
+) -> Iterator[tuple[Trial, Drive]]:
+    """The trials as they are done, by processes of this machine or by Ray's."""
+    if settings.ray is None:
+        return spread(work, trials, settings.workers)
+    return spread_over_cluster(work, trials, settings.workers, settings.ray)
+
+
+def _keep(folder: Path, drive: Drive) -> None:
+    """Writes an episode's files, and last its line. Raises ValueError where a worker ran other code."""
+    if drive.code != code_version():
+        raise ValueError(
+            f"found a worker with code {drive.code}, wanted {code_version()}: install the same caldrive on all machines"
+        )
+    for name, content in drive.files.items():
+        write_whole(folder / name, content)
+    _append(folder / RESULTS, drive.line)

@@ -71,6 +71,8 @@ class BenchmarkSettings:
     """Folder for results.jsonl, a line an episode, and run.json, which says what drove."""
     workers: int = 2
     """Processes that drive at the same time."""
+    ray: str | None = None
+    """Drive with Ray: local, auto for the cluster that this machine belongs to, or a cluster's address."""
     cap: float = 20.0
     """A speed in km/h that no limit exceeds, as in the paper's comparison."""
     signs: bool = False

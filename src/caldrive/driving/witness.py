@@ -14,7 +14,6 @@ from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.trace import Trace, episode_json
-from caldrive.files import write_whole
 from caldrive.results import EpisodeResult, Outcome
 from caldrive.world.embedded import EmbeddedWorld
 
@@ -51,10 +50,10 @@ class Witness:
             self.stills += self.world.images([STILL])
         self._counted = len(self.referee.infractions)
 
-    def write(self, folder: Path, key: str, result: EpisodeResult) -> None:
-        """Trace and stills into a folder."""
+    def files(self, key: str, result: EpisodeResult) -> dict[str, bytes]:
+        """Trace and stills by their names in a benchmark's folder."""
         if result.outcome is not Outcome.SUCCESS and len(self.stills) < MOST:
             self.stills += self.world.images([STILL])
-        write_whole(trace_path(folder, key), gzip.compress(episode_json(result, self.trace), mtime=0))
-        for k, still in enumerate(self.stills):
-            write_whole(folder / "stills" / f"{key}-{k}.jpg", simplejpeg.encode_jpeg(still, 85, colorspace="RGB"))
+        found = {str(trace_path(Path(), key)): gzip.compress(episode_json(result, self.trace), mtime=0)}
+        pictures = (simplejpeg.encode_jpeg(still, 85, colorspace="RGB") for still in self.stills)
+        return found | {f"stills/{key}-{k}.jpg": picture for k, picture in enumerate(pictures)}

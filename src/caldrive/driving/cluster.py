@@ -1,0 +1,62 @@
+"""Work for processes on one machine or many, through Ray (the extra `ray`). A worker that dies is replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from caldrive.driving.pool import MOST_DEATHS
+
+T = TypeVar("T")
+R = TypeVar("R")
+LOCAL = "local"
+
+
+def _ray() -> Any:
+    try:
+        import ray
+    except ImportError as error:
+        raise RuntimeError("found no Ray, wanted it for --ray: type pip install 'caldrive[ray]'") from error
+    return ray
+
+
+def _done(work: Callable[[T], R], item: T) -> R:
+    return work(item)
+
+
+def _connect(ray: Any, address: str, workers: int) -> None:
+    """Starts Ray on this machine, or joins a cluster. Raises ValueError where there is none at the address."""
+    quiet = {"log_to_driver": False, "logging_level": "ERROR"}
+    if address == LOCAL:
+        ray.init(num_cpus=workers, include_dashboard=False, **quiet)
+        return
+    try:
+        ray.init(address=address, **quiet)
+    except (ConnectionError, RuntimeError) as error:
+        raise ValueError(
+            f"found no Ray cluster at {address}, wanted one: type ray start --head there, or --ray {LOCAL}"
+        ) from error
+
+
+def spread_over_cluster(
+    work: Callable[[T], R], items: Sequence[T], workers: int, address: str
+) -> Iterator[tuple[T, R]]:
+    """Does what `pool.spread` does with Ray's workers. address: of a cluster, `auto` for the one this machine belongs
+    to, `local` for one on this machine alone with so many workers.
+
+    Raises RuntimeError where Ray is missing or workers die again and again, ValueError where there is no cluster.
+    """
+    ray = _ray()
+    _connect(ray, address, workers)
+    try:
+        remote = ray.remote(max_retries=MOST_DEATHS, num_cpus=1)(_done)
+        jobs = {remote.remote(work, item): item for item in items}
+        while jobs:
+            done, _ = ray.wait(list(jobs), num_returns=1)
+            yield jobs.pop(done[0]), ray.get(done[0])
+    except ray.exceptions.WorkerCrashedError as error:
+        raise RuntimeError(
+            f"found that workers die, {MOST_DEATHS + 1} times at one episode: type --workers 1 to see what happens"
+        ) from error
+    finally:
+        ray.shutdown()

@@ -1,0 +1,66 @@
+"""Decors made up at random: the same streets, another look."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from caldrive.config import CameraConfig
+from caldrive.datatypes import VehicleState
+from caldrive.world.camera import Camera
+from caldrive.world.decor import TOWNS
+from caldrive.world.redecoration import GROUND_FLOOR, N_DESIGNS, PAVINGS, UPPER, YARDS, redecorated
+from caldrive.world.roads import RoadNetwork
+from caldrive.world.scenery import build_scenery
+from caldrive.world.textures import Tex
+from caldrive.world.towns import load_town
+
+
+@pytest.fixture(scope="module")
+def roads() -> RoadNetwork:
+    return load_town("town01")
+
+
+@pytest.mark.parametrize("town", TOWNS)
+def test_arrangement_0_is_the_town_as_it_is(town: str) -> None:
+    assert redecorated(town, 0) is TOWNS[town]
+    assert len(TOWNS[town].designs) == N_DESIGNS
+
+
+def test_a_decor_depends_on_its_number_only() -> None:
+    assert redecorated("town01", 5) == redecorated("town01", 5)
+    assert redecorated("town01", 5) != redecorated("town01", 6)
+
+
+def test_what_only_town02_is_built_of_is_in_no_made_up_decor() -> None:
+    def used(name: str) -> set[Tex]:
+        decor = TOWNS[name]
+        grounds = {decor.ground.pavement[0], decor.ground.yard[0], *(crown.layer for crown in decor.crowns)}
+        return grounds | {layer for d in decor.designs for layer in (d.upper, d.ground, d.roof)}
+
+    own = used("town02") - used("town01") - {Tex.PLAIN}
+    assert len(own) >= 6
+    assert not own & {*UPPER, *GROUND_FLOOR, *PAVINGS, *YARDS}
+    made_up = redecorated("town01", 3)
+    assert not own & {layer for design in made_up.designs for layer in (design.upper, design.ground, design.roof)}
+    assert not own & {crown.layer for crown in made_up.crowns}
+
+
+def test_houses_keep_two_floors_whatever_the_decor() -> None:
+    assert min(redecorated("town01", k).style.floors[0] for k in range(1, 200)) >= 2
+
+
+def test_a_street_looks_different_and_lies_where_it_lay(roads: RoadNetwork) -> None:
+    lane = max(roads.driveable, key=lambda lane: lane.line.length)
+    ego = VehicleState(lane.line.pose_at(20.0), 0.0, 4.2, 1.8, "ego")
+    pictures, classes = [], []
+    for number in (0, 1, 2):
+        camera = Camera(roads, build_scenery(roads, number), redecorated("town01", number))
+        pictures.append(camera.render(1, ego, [], [], {}, [CameraConfig()], 0.0)[0].astype(float))
+        classes.append(camera.render_semantics(ego, [], [], [CameraConfig()])[0])
+        camera.close()
+    sidewalk, road = (classes[0] == kind for kind in (3, 1))
+    assert sidewalk.mean() > 0.02
+    for other in (1, 2):
+        assert (classes[other][sidewalk | road] == classes[0][sidewalk | road]).mean() > 0.9  # but for paint and trees
+        assert np.abs(pictures[other] - pictures[0])[sidewalk].mean() > 10
