@@ -48,6 +48,13 @@ def test_cells_count_by_condition_and_task() -> None:
     assert first.completion == pytest.approx(0.75)
 
 
+def test_only_a_goal_reached_without_a_fault_of_ones_own_is_clean() -> None:
+    hit = Infraction(InfractionKind.COLLISION_CAR, 1.0, 0, 0, at_fault=False)
+    by_others = replace(driven(), result=replace(driven().result, infractions=(hit,)))
+    found = cells([driven(), by_others, driven(Outcome.TIMEOUT), driven(broken=(InfractionKind.SIDEWALK,))])
+    assert [(cell.episodes, cell.successes, cell.clean) for cell in found] == [(4, 3, 2)]
+
+
 def test_the_way_covered_never_leaves_its_bounds() -> None:
     assert completion(driven(Outcome.TIMEOUT, done=-5.0)) == 0.0
     assert completion(driven(Outcome.TIMEOUT, done=2000.0)) == 1.0

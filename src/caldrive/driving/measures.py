@@ -21,12 +21,14 @@ PENALTIES = {
 
 @dataclass(frozen=True)
 class Cell:
-    """A task in a condition: episodes, successes, share of the routes covered, and the driving score in [0, 100]."""
+    """A task in a condition: episodes, successes, those of them in which no rule was broken and nothing hit (what
+    traffic school counts), share of the routes covered, and the driving score in [0, 100]."""
 
     condition: str
     task: str
     episodes: int
     successes: int
+    clean: int
     completion: float
     score: float
 
@@ -66,9 +68,16 @@ def _cell(condition: str, task: str, members: Sequence[Driven]) -> Cell:
         task,
         n,
         sum(one.result.outcome is Outcome.SUCCESS for one in members),
+        sum(clean(one) for one in members),
         sum(completion(one) for one in members) / n,
         sum(driving_score(one) for one in members) / n,
     )
+
+
+def clean(one: Driven) -> bool:
+    """Whether an episode reached its goal without a collision, red light, opposite lane or sidewalk of its own
+    fault."""
+    return one.result.outcome is Outcome.SUCCESS and not any(broken.at_fault for broken in one.result.infractions)
 
 
 def completion(one: Driven) -> float:
