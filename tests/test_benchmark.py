@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,15 @@ def test_two_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Pat
     two = replace(whole, out=tmp_path, workers=2)
     list(benchmark(two))
     assert lines(two) == lines(whole)
+
+
+@pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
+def test_rays_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    ray = replace(whole, out=tmp_path, workers=2, ray="local")
+    list(benchmark(ray))
+    assert lines(ray) == lines(whole)
+    files = [sorted(path.name for path in (one.out / "traces").iterdir()) for one in (ray, whole)]
+    assert files[0] == files[1]
 
 
 def test_results_stand_in_the_suites_order(whole: BenchmarkSettings) -> None:
