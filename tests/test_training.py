@@ -126,3 +126,21 @@ def test_an_unknown_precision_is_named() -> None:
 def test_tensorboard_finds_the_figures_where_it_is_installed(folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, progress=False)
     assert (tmp_path / "tensorboard").is_dir() == (find_spec("tensorboard") is not None)
+
+
+@pytest.mark.parametrize(
+    ("able", "pays"),
+    [
+        ({"cpu_name": "Intel Xeon", "avx512_bf16": True, "amx_bf16": False}, False),
+        ({"cpu_name": "Intel Xeon", "avx512_bf16": True, "amx_bf16": True}, True),
+        ({"cpu_name": "AMD EPYC", "avx512_bf16": True}, True),
+        ({"architecture": "aarch64"}, False),
+    ],
+)
+def test_bfloat16_is_used_where_it_is_faster(
+    able: dict[str, object], pays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: able)
+    assert use_bf16("auto", "cpu") is pays
+    assert use_bf16("bf16", "cpu")
+    assert use_bf16("auto", "cuda")
