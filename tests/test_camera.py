@@ -208,3 +208,6 @@ def test_layers_stand_in_the_order_of_their_names() -> None:
 def test_the_contact_sheet_shows_what_is_asked_for() -> None:
     sheet = contact_sheet("town02", (64, 32), (1, 13))
     assert sheet.shape == (6 + 2 * (32 + 24), 6 + 3 * 70, 3)
+    looks = contact_sheet("town01", (64, 32), (1,), looks=2)
+    first, second = looks[6 + 18 : 6 + 50].astype(int), looks[6 + 56 + 18 : 6 + 56 + 50]
+    assert np.abs(first - second).mean() > 5

@@ -164,7 +164,7 @@ def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: py
 
 def test_town_writes_its_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = ModuleType("caldrive.world.sheet")
-    module.contact_sheet = lambda town: np.full((40, 80, 3), len(town), np.uint8)  # type: ignore[attr-defined]
+    module.contact_sheet = lambda town, looks: np.full((40, 80, 3), len(town) + looks, np.uint8)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "caldrive.world.sheet", module)
     found = run_json("town", "--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
     assert (found["width"], found["height"]) == (160, 80)

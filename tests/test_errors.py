@@ -38,6 +38,7 @@ MISTAKES = {
     "unknown town, timed": (["speed", "world", "--town", "mars"], "--town town01"),
     "sheet of no kind": (["town", "--sheet", "{tmp}/town.jpg"], "wanted a name that ends in .png"),
     "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384 pixels"),
+    "sheet of too many looks": (["town", "--sheet", "{tmp}/town.png", "--looks", "-1"], "wanted 0 to 100"),
     "sheet in a folder's place": (["town", "--sheet", "{tmp}/folder.png"], "is a folder"),
 }
 

@@ -120,7 +120,7 @@ class CollectConfig:
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 3, 6, 8)
-    episodes: int = 440
+    episodes: int = 330
     duration: float = 30.0
     cars: int = 75
     people: int = 70
@@ -202,7 +202,7 @@ class TrainingConfig:
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
     """
 
-    steps: int = 10_000
+    steps: int = 6_000
     batch: int = 96
     window: int = 1
     learning_rate: float = 1e-3

@@ -30,12 +30,14 @@ class Town(Output):
     """The PNG file to write."""
     width: int | None = None
     """Its width in pixels."""
+    looks: int = 0
+    """Show so many of the made-up looks that recordings give the town, instead of the weathers."""
 
     def run(self, progress: Progress) -> Answer:
         from caldrive.driving.sheet import write_sheet
 
         progress("drawing", 0.0)
-        width, height = write_sheet(self.town, self.sheet, self.width)
+        width, height = write_sheet(self.town, self.sheet, self.width, self.looks)
         values = {"town": self.town, "sheet": str(self.sheet), "width": width, "height": height}
         return Answer(values, f"{self.town} on one page: {self.sheet} ({width} x {height})")
 

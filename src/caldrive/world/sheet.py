@@ -1,9 +1,10 @@
-"""A contact sheet of a town: all weathers from a few places, with captions."""
+"""A contact sheet of a town: all weathers or several looks from a few places, with captions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 import numpy as np
 from PIL import Image as Picture
@@ -13,6 +14,7 @@ from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved
 from caldrive.world.camera import Camera
+from caldrive.world.redecoration import redecorated
 from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.scenery import build_scenery
 from caldrive.world.towns import load_town
@@ -49,22 +51,34 @@ def company(pose: Pose) -> tuple[list[VehicleState], list[PedestrianState]]:
     )
 
 
-def contact_sheet(town: str, size: tuple[int, int] = (320, 144), weathers: Sequence[int] = tuple(WEATHERS)) -> Image:
-    """A picture (H, W, 3): one row for each weather, one column for each view. Raises as `load_town` does."""
+def contact_sheet(
+    town: str, size: tuple[int, int] = (320, 144), weathers: Sequence[int] = tuple(WEATHERS), looks: int = 0
+) -> Image:
+    """A picture (H, W, 3): one column for each view, one row for each weather. Raises as `load_town` does.
+
+    looks: if not 0, rows for so many made-up looks of the town instead, in the weathers in turn.
+    """
     roads = load_town(town)
-    camera = Camera(roads, build_scenery(roads), samples=4)
-    places, mount = viewpoints(roads), CameraConfig(*size)
-    width, height = size[0] + MARGIN, size[1] + CAPTION + MARGIN
-    sheet = Picture.new("RGB", (len(places) * width + MARGIN, len(weathers) * height + MARGIN), (24, 25, 27))
+    rows = [(weathers[k % len(weathers)], k + 1) for k in range(looks)] or [(id, 0) for id in weathers]
+    n_places, cell = len(viewpoints(roads)), (size[0] + MARGIN, size[1] + CAPTION + MARGIN)
+    sheet = Picture.new("RGB", (n_places * cell[0] + MARGIN, len(rows) * cell[1] + MARGIN), (24, 25, 27))
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
+    for arrangement, members in groupby(enumerate(rows), lambda row: row[1][1]):
+        camera = Camera(roads, build_scenery(roads, arrangement), redecorated(roads.style, arrangement), samples=4)
+        for row, (id, _) in members:
+            for column, (name, picture) in enumerate(_views(camera, roads, id, size)):
+                x, y = MARGIN + column * cell[0], MARGIN + row * cell[1]
+                sheet.paste(Picture.fromarray(picture), (x, y + CAPTION))
+                look = f", look {arrangement}" if arrangement else ""
+                draw.text((x, y), f"{roads.name}{look}, {id} {WEATHERS[id].name}, {name}", (226, 226, 222), font)
+        camera.close()
+    return np.asarray(sheet)
+
+
+def _views(camera: Camera, roads: RoadNetwork, weather: int, size: tuple[int, int]) -> Iterator[tuple[str, Image]]:
+    """What is to be seen from the viewpoints, with the name of each."""
     states = list(LightState)
     lights = {post.id: states[(k + 2) % 3] for k, post in enumerate(roads.posts)}
-    for row, id in enumerate(weathers):
-        for column, (name, pose) in enumerate(places):
-            cars, people = company(pose)
-            picture = camera.render(id, VehicleState(pose), cars, people, lights, [mount], 1.0)[0]
-            x, y = MARGIN + column * width, MARGIN + row * height
-            sheet.paste(Picture.fromarray(picture), (x, y + CAPTION))
-            draw.text((x, y), f"{roads.name}, {id} {WEATHERS[id].name}, {name}", (226, 226, 222), font)
-    camera.close()
-    return np.asarray(sheet)
+    for name, pose in viewpoints(roads):
+        cars, people = company(pose)
+        yield name, camera.render(weather, VehicleState(pose), cars, people, lights, [CameraConfig(*size)], 1.0)[0]
