@@ -21,7 +21,7 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# From nothing to the network that the package ships; a run that was stopped goes on. The log keeps every step's time.
+# From nothing to a network like the one that the package ships; a run that was stopped goes on. The log keeps every step's time.
 model: $(READY)
 	@mkdir -p $(MODEL)
 	@step() { echo "$$(date +%FT%T) caldrive $$*" | tee -a $(MODEL)/log.txt; $(BIN)/caldrive "$$@" | tee -a $(MODEL)/log.txt; }; \
@@ -29,7 +29,7 @@ model: $(READY)
 	step data $(MODEL)/recording --picture $(MODEL)/recording.png; \
 	step train --data $(MODEL)/recording --out $(MODEL)/training; \
 	step evaluate --data $(MODEL)/recording --model $(MODEL)/training/model.safetensors --held-out --worst $(MODEL)/worst.png; \
-	step collect --out $(MODEL)/elsewhere --town town02 --weathers 4 14 --episodes 24 --cars 15 --people 50; \
+	step collect --out $(MODEL)/elsewhere --town town02 --weathers 4 14 --episodes 24 --cars 15 --people 50 --rearranged 0; \
 	step evaluate --data $(MODEL)/elsewhere --model $(MODEL)/training/model.safetensors; \
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt

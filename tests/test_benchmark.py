@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from caldrive.driving import benchmark as runner
-from caldrive.driving.benchmark import benchmark, read_lines, read_results
+from caldrive.driving import ledger
+from caldrive.driving.benchmark import benchmark, read_results
+from caldrive.driving.ledger import read_lines
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import suite, to_json
 from caldrive.world.traffic import stop_sumo
@@ -87,7 +89,7 @@ def test_results_of_another_run_are_not_added_to(whole: BenchmarkSettings, chang
 
 
 def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "code_version", lambda: "other")
+    monkeypatch.setattr(ledger, "code_version", lambda: "other")
     with pytest.raises(ValueError, match="with code"):
         next(benchmark(whole))
 
@@ -107,21 +109,23 @@ def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:
     found = json.loads((whole.out / "run.json").read_text())
     assert found["agent"] == "oracle"
     assert found["cap"] == 20.0
-    assert found["code"] == runner.code_version()
+    assert found["code"] == ledger.code_version()
 
 
-def test_a_worker_with_other_code_is_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
-    drive = runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, "other")
-    with pytest.raises(ValueError, match="install the same caldrive on all machines"):
-        runner._keep(tmp_path, drive)
+OURS = {"code": "1", "model": None, "precision": None}
+
+
+@pytest.mark.parametrize("name", ["code", "model", "precision"])
+def test_a_worker_that_drives_with_something_else_is_refused(name: str, tmp_path: Path) -> None:
+    drive = runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS | {name: "other"})
+    with pytest.raises(ValueError, match=f"worker with {name} other.*install the same caldrive and model"):
+        runner._keep(tmp_path, drive, OURS)
     assert not list(tmp_path.iterdir())
 
 
-def test_files_are_there_before_their_line(
-    whole: BenchmarkSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(runner, "_append", lambda path, line: pytest.fail("was killed before the line"))
+def test_files_are_there_before_their_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "append", lambda path, line: pytest.fail("was killed before the line"))
     with pytest.raises(pytest.fail.Exception):
-        runner._keep(tmp_path, runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, runner.code_version()))
+        runner._keep(tmp_path, runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS), OURS)
     assert (tmp_path / "traces" / "a.json.gz").read_bytes() == b"x"
     assert read_lines(tmp_path / "results.jsonl") == {}

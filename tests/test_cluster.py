@@ -35,6 +35,16 @@ def test_all_work_is_done_once_though_a_worker_dies(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["died-1"]
 
 
+def _fails(k: int) -> int:
+    raise ValueError(f"found {k}")
+
+
+@needs_ray
+def test_an_error_in_the_work_is_the_works_own() -> None:
+    with pytest.raises(ValueError, match=r"^found 0$"):
+        list(spread_over_cluster(_fails, [0], 2, "local"))
+
+
 @needs_ray
 def test_a_cluster_that_is_not_there_is_named() -> None:
     with pytest.raises(ValueError, match="found no Ray cluster at auto"):

@@ -54,6 +54,19 @@ def test_an_error_in_the_work_ends_it(workers: int) -> None:
         list(spread(_fails, [0], workers))
 
 
+def _marks(folder: Path, k: int) -> int:
+    (folder / f"{k}").touch()
+    time.sleep(0.05)
+    return k
+
+
+def test_what_nobody_waits_for_any_more_is_not_done(tmp_path: Path) -> None:
+    work = spread(partial(_marks, tmp_path), range(100), 2)
+    next(work)
+    work.close()  # type: ignore[attr-defined]
+    assert 1 <= len(list(tmp_path.iterdir())) < 20
+
+
 def _sleeps(folder: Path, k: int) -> int:
     (folder / f"{os.getpid()}").touch()
     time.sleep(60)

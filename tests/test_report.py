@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ from caldrive.driving.report_page import report_page
 from caldrive.driving.report_tables import tables
 from caldrive.driving.report_text import report_text
 from caldrive.driving.suites import Driven, suite
+from caldrive.driving.trace import result_values
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -90,6 +92,16 @@ def test_the_text_holds_all_tables_and_failures(runs: list[Run]) -> None:
 
 def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"no run\.json"):
+        load_run(tmp_path)
+
+
+def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
+    (trial, *_) = suite("quick")
+    old = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), {"jerk": 0.4})
+    line = {"key": trial.key, "result": result_values(old), "figures": {}}
+    (tmp_path / "run.json").write_text(json.dumps(ABOUT | {"seed": 0, "time_limit": "paper"}))
+    (tmp_path / "results.jsonl").write_text(json.dumps(line) + "\n")
+    with pytest.raises(ValueError, match="older caldrive"):
         load_run(tmp_path)
 
 

@@ -61,8 +61,17 @@ def test_a_run_may_begin_with_a_trained_network(folder: Path, tmp_path: Path) ->
     second = train(still, folder, tmp_path / "second", TINY, progress=False)
     before, after = (dict(load_network(path)[0].named_parameters()) for path in (first, second))
     assert torch.equal(before["backbone.stages.0.0.weight"], after["backbone.stages.0.0.weight"])
+    first.unlink()  # what a run began with is needed no more once it has a state
+    assert train(still, folder, tmp_path / "second", TINY, progress=False) == second
+    with pytest.raises(CheckpointError, match="there is no checkpoint"):
+        train(still, folder, tmp_path / "again", TINY, progress=False)
+
+
+def test_a_run_does_not_begin_with_a_network_of_another_kind(folder: Path, tmp_path: Path) -> None:
+    first = train(replace(SHORT, steps=1), folder, tmp_path / "first", TINY, progress=False)
+    still = replace(SHORT, steps=1, initial=str(first))
     with pytest.raises(CheckpointError, match="other blocks or another size"):
-        train(replace(still, initial=str(first)), folder, tmp_path / "third", replace(TINY, width=0.5), progress=False)
+        train(still, folder, tmp_path / "third", replace(TINY, width=0.5), progress=False)
 
 
 def test_a_state_of_other_settings_is_not_taken_up(folder: Path, tmp_path: Path) -> None:

@@ -68,7 +68,10 @@ class Train(TrainSettings, Output):
             steps=config.steps if self.steps is None else self.steps,
             learning_rate=config.learning_rate if self.rate is None else self.rate,
         )  # fmt: skip
-        imagenet = self.imagenet or (imagenet_file() if PERCEPTIONS[self.preset].width == 1.0 else None)
+        if self.initial and self.imagenet:
+            raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
+        wanted = PERCEPTIONS[self.preset].width == 1.0 and not self.initial
+        imagenet = self.imagenet or (imagenet_file() if wanted else None)
         model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
         return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
 

@@ -3,6 +3,7 @@ infraction, how long it was off its lane, and how many red lights it met."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,8 +31,8 @@ class Behaviour:
         truth = step.truth
         off = truth.opposite_share > OFF or truth.sidewalk_share > OFF
         self._rows.append((truth.time, truth.affordances.red_light, off))
-        seen = step.decision.affordances if step.decision is not None else truth.affordances
-        self._errors.append(_errors(seen, truth.affordances))
+        seen = step.decision.affordances if step.decision is not None else None
+        self._errors.append(_errors(seen, truth.affordances) if seen else (math.nan,) * len(NAMES))
 
     def figures(self, infractions: Sequence[Infraction]) -> dict[str, Any]:
         """All figures by name."""
@@ -40,7 +41,11 @@ class Behaviour:
         before = [errors[(time > one.time - BEFORE) & (time <= one.time)] for one in infractions]
         found: dict[str, Any] = {"off_lane": float(off.mean()), "reds_met": int((np.diff(red, prepend=0.0) > 0).sum())}
         for prefix, part in (("error", errors), *((f"before/{k}", part) for k, part in enumerate(before))):
-            found |= {f"{prefix}/{name}": float(v) for name, v in zip(NAMES, np.nanmean(part, axis=0), strict=True)}
+            known = part[~np.isnan(part).all(axis=1)]  # an agent may decide without affordances
+            if len(known):
+                found |= {
+                    f"{prefix}/{name}": float(v) for name, v in zip(NAMES, np.nanmean(known, axis=0), strict=True)
+                }
         return found
 
 

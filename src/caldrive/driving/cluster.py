@@ -28,13 +28,13 @@ def _connect(ray: Any, address: str, workers: int) -> None:
     """Starts Ray on this machine, or joins a cluster. Raises ValueError where there is none at the address."""
     quiet = {"log_to_driver": False, "logging_level": "ERROR"}
     if address == LOCAL:
-        ray.init(num_cpus=workers, include_dashboard=False, **quiet)
+        ray.init(address=LOCAL, num_cpus=workers, include_dashboard=False, **quiet)
         return
     try:
         ray.init(address=address, **quiet)
     except (ConnectionError, RuntimeError) as error:
         raise ValueError(
-            f"found no Ray cluster at {address}, wanted one: type ray start --head there, or --ray {LOCAL}"
+            f"found no Ray cluster at {address} ({error}), wanted one: type ray start --head there, or --ray {LOCAL}"
         ) from error
 
 
@@ -54,9 +54,11 @@ def spread_over_cluster(
         while jobs:
             done, _ = ray.wait(list(jobs), num_returns=1)
             yield jobs.pop(done[0]), ray.get(done[0])
-    except ray.exceptions.WorkerCrashedError as error:
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause from None  # the work's own error, as without Ray
+    except ray.exceptions.RayError as error:
         raise RuntimeError(
-            f"found that workers die, {MOST_DEATHS + 1} times at one episode: type --workers 1 to see what happens"
+            f"found that Ray's workers fail ({type(error).__name__}): type --workers 1 without --ray to see why"
         ) from error
     finally:
         ray.shutdown()

@@ -82,7 +82,8 @@ def _set_up(
     world: EmbeddedWorld, config: CollectConfig, number: int, rng: np.random.Generator
 ) -> tuple[Scenario, CALAgent]:
     """A random start and random turns; returns the scenario and the driver."""
-    roads = world.enter(config.town, 1 + number if rng.random() < config.rearranged else 0)
+    arrangement = int(rng.integers(1, 2**31))
+    roads = world.enter(config.town, arrangement if rng.random() < config.rearranged else 0)
     start, turn = starting_place(roads, config.before_signs, config.before_turns, rng)
     route = random_route(roads, start, config.duration * 14 + 50, rng, turn)
     under = config.weathers[number % len(config.weathers)]
@@ -125,11 +126,16 @@ def _record(config: CollectConfig, folder: Path, number: int) -> int:
 
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
-    least = {"episodes": 1, "duration": 0.1, "cars": 0, "people": 0, "width": 16, "height": 16, "seed": 0, "workers": 1}
+    least = {
+        "episodes": 1, "duration": 0.1, "cars": 0, "people": 0, "width": 16, "height": 16, "seed": 0,
+        "rearranged": 0.0, "workers": 1,
+    }  # fmt: skip
     asked = asdict(config) | {"workers": workers}
     for name, low in least.items():
         if not asked[name] >= low:
             raise ValueError(f"found --{name} {asked[name]}, wanted at least {low}: type --{name} {low}")
+    if not config.rearranged <= 1:
+        raise ValueError(f"found --rearranged {config.rearranged:g}, wanted at most 1: type --rearranged 1")
     if not config.weathers:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 3 6 8")
     for number in config.weathers:

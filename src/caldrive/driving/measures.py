@@ -21,8 +21,8 @@ PENALTIES = {
 
 @dataclass(frozen=True)
 class Cell:
-    """A task in a condition: episodes, successes, those of them in which no rule was broken and nothing hit (what
-    traffic school counts), share of the routes covered, and the driving score in [0, 100]."""
+    """A task in a condition: episodes, successes, those of them without an infraction of one's own fault, share of the
+    routes covered, and the driving score in [0, 100]."""
 
     condition: str
     task: str

@@ -41,12 +41,15 @@ def spread(work: Callable[[T], R], items: Sequence[T], workers: int) -> Iterator
         before = len(left)
         try:
             count = min(workers, len(left))
-            with ProcessPoolExecutor(count, get_context("spawn"), initializer=_end_with_parent) as pool:
+            pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_end_with_parent)
+            try:
                 jobs = {pool.submit(work, items[k]): k for k in left}
                 for job in as_completed(jobs):
                     result = job.result()
                     left.remove(jobs[job])
                     yield items[jobs[job]], result
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
         except BrokenProcessPool as error:
             deaths = deaths + 1 if len(left) == before else 0
             if deaths == MOST_DEATHS:

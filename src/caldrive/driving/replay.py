@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.datatypes import Step
-from caldrive.driving.benchmark import RESULTS, read_lines, read_run
 from caldrive.driving.drivers import set_up
 from caldrive.driving.film import EpisodeFilm, caption
+from caldrive.driving.ledger import RESULTS, read_lines, read_run
 from caldrive.driving.outputs import require_writable_file
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from caldrive.driving.benchmark import read_results, read_run
+from caldrive.driving.benchmark import read_results
+from caldrive.driving.ledger import read_run
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import Driven
 from caldrive.results import Outcome
@@ -44,6 +45,8 @@ def load_run(folder: Path) -> Run:
     driven = read_results(settings)
     if not driven:
         raise ValueError(f"found no episode in {folder}, wanted some: type caldrive benchmark --out {folder}")
+    if not all("turning" in one.result.comfort for one in driven):
+        raise ValueError(f"found results of an older caldrive in {folder}: type caldrive benchmark --out ANOTHER")
     return Run(about["agent"], folder, about, tuple(driven))
 
 

@@ -59,9 +59,9 @@ def _success(runs: Sequence[Run]) -> Table:
         for head in (f"{run.name} %", f"{run.name} clean %", f"{run.name} route %", f"{run.name} score")
     ]
     text = (
-        "Percent of the episodes that reached their goal in time, with Wilson's 95 % interval; of those that did so "
-        "clean, with no rule broken and nothing hit; share of the routes covered; driving score of Leaderboard 2.1. "
-        "The paper's systems drove in CARLA."
+        "Percent of the episodes that reached their goal in time, with Wilson's 95 % interval; percent that did so "
+        "clean, without an infraction of their own fault; share of the routes covered; driving score of Leaderboard "
+        "2.1. The paper's systems drove in CARLA."
     )
     head = ("condition", "task", *ours, *(f"{system} (paper)" for system in SYSTEMS))
     return Table("Success", text, head, tuple(rows))

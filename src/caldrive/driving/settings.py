@@ -70,7 +70,7 @@ class BenchmarkSettings:
     out: Path = Path("out/benchmark")
     """Folder for results.jsonl, a line an episode, and run.json, which says what drove."""
     workers: int = 2
-    """Processes that drive at the same time."""
+    """Processes that drive at the same time, here or with --ray local; a cluster uses all its processors."""
     ray: str | None = None
     """Drive with Ray: local, auto for the cluster that this machine belongs to, or a cluster's address."""
     cap: float = 20.0
@@ -147,6 +147,8 @@ class CollectSettings:
     """Width of the images in pixels; the preset paper takes 320."""
     height: int = CollectConfig.height
     """Height of the images in pixels; the preset paper takes 144."""
+    rearranged: float = CollectConfig.rearranged
+    """Share of the episodes with other houses, trees and colours along the same streets."""
     semantic: bool = False
     """Also record what each pixel shows: a number of world/semantics.py for each."""
     workers: int = 2

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeVar
-
 import numpy as np
 
 from caldrive.datatypes import Command, Pose
+from caldrive.world.redecoration import one_of
 from caldrive.world.roads import Lane, RoadNetwork
-
-T = TypeVar("T")
 
 
 def starting_place(
@@ -21,22 +17,18 @@ def starting_place(
     chance = rng.random()
     limits = sorted({sign.limit for sign in roads.signs})
     if limits and chance < before_signs:
-        limit = _one_of(limits, rng)
-        sign = _one_of([sign for sign in roads.signs if sign.limit == limit], rng)
+        limit = one_of(limits, rng)
+        sign = one_of([sign for sign in roads.signs if sign.limit == limit], rng)
         lane, at = roads.lane_at(sign.pose)
         return _upstream(roads, lane, at - float(rng.uniform(15, 60))), None
     turns = [lane for lane in roads.lanes.values() if lane.turn is not None]
     commands = [command for command in Command if any(lane.turn is command for lane in turns)]
     if commands and before_signs <= chance < before_signs + before_turns:
-        command = _one_of(commands, rng)
-        turn = _one_of([lane for lane in turns if lane.turn is command], rng)
+        command = one_of(commands, rng)
+        turn = one_of([lane for lane in turns if lane.turn is command], rng)
         return _upstream(roads, turn, -float(rng.uniform(5, 40))), turn.id
-    lane = _one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
+    lane = one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
     return lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3))), None
-
-
-def _one_of(things: Sequence[T], rng: np.random.Generator) -> T:
-    return things[int(rng.integers(len(things)))]
 
 
 def _upstream(roads: RoadNetwork, lane: Lane, s: float) -> Pose:

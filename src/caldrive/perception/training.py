@@ -48,11 +48,16 @@ def _initial(path: str, perception: PerceptionConfig) -> Network:
 
 
 def start(
-    config: TrainingConfig, perception: PerceptionConfig, frames: Frames, imagenet: Path | None, team: Team
+    config: TrainingConfig,
+    perception: PerceptionConfig,
+    frames: Frames,
+    imagenet: Path | None,
+    team: Team,
+    initial: str | None = None,
 ) -> Run:
-    """A run at its first step."""
+    """A run at its first step; initial: the network to begin with."""
     torch.manual_seed(config.seed)
-    network = Network(perception) if config.initial is None else _initial(config.initial, perception)
+    network = Network(perception) if initial is None else _initial(initial, perception)
     if imagenet is not None:
         network.backbone.load_imagenet(imagenet)
     network = network.to(team.device)
@@ -95,8 +100,9 @@ def train(
         find_episodes(data, semantic=config.augment), config.validation_share, config.seed
     )
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
-    run = start(config, perception, frames, imagenet, team)
-    if (out / STATE).is_file():
+    known = (out / STATE).is_file()  # then what the run began with is needed no more
+    run = start(config, perception, frames, None if known else imagenet, team, None if known else config.initial)
+    if known:
         run.restore(out / STATE)
     team.wait()
     rows, board = kept_rows(out / METRICS, run.step), Board(out / "tensorboard", team.leads)

@@ -1,7 +1,7 @@
 """Decors made up at random: the same streets as if they lay in another town, for recordings that teach what a street
 looks like anywhere.
 
-They are built of what the training town and nobody is built of; what `town02` alone has stays unseen.
+No façade, paving, ground cover or crown of `town02` is in any of them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ def _range(rng: np.random.Generator, low: float, high: float, widest: float) -> 
     return least, least + float(rng.uniform(0.0, widest))
 
 
-def _one_of(things: Sequence[T], rng: np.random.Generator) -> T:
+def one_of(things: Sequence[T], rng: np.random.Generator) -> T:
+    """Any of some things, each as likely."""
     return things[int(rng.integers(len(things)))]
 
 
@@ -84,8 +85,8 @@ def _paint(rng: np.random.Generator) -> Paint:
 
 
 def _ground(rng: np.random.Generator) -> Ground:
-    pavement = _one_of(PAVINGS, rng), _tint(rng, 60, 250, 0.45), float(rng.uniform(1.0, 4.0))
-    yard = _one_of(YARDS, rng), _tint(rng, 80, 250, 0.35), float(rng.uniform(3.0, 12.0))
+    pavement = one_of(PAVINGS, rng), _tint(rng, 60, 250, 0.45), float(rng.uniform(1.0, 4.0))
+    yard = one_of(YARDS, rng), _tint(rng, 80, 250, 0.35), float(rng.uniform(3.0, 12.0))
     return Ground(float(rng.uniform(3.0, 9.0)), _tint(rng, 70, 240, 0.2), pavement, yard)
 
 
@@ -93,7 +94,7 @@ def _design(rng: np.random.Generator) -> Design:
     rise = 0.0 if rng.random() < 0.4 else float(rng.uniform(1.0, 4.0))
     roof = Tex.TILES if rise and rng.random() < 0.7 else Tex.PLAIN
     return Design(
-        _one_of(UPPER, rng), _one_of(GROUND_FLOOR, rng), _tint(rng, 70, 250, 0.45), _tint(rng, 90, 250, 0.3),
+        one_of(UPPER, rng), one_of(GROUND_FLOOR, rng), _tint(rng, 70, 250, 0.45), _tint(rng, 90, 250, 0.3),
         roof, _tint(rng, 50, 220, 0.5), rise,
     )  # fmt: skip
 
@@ -103,4 +104,4 @@ def _crown(crown: Crown, rng: np.random.Generator) -> Crown:
     wide, foot = float(rng.uniform(0.5, 1.3)), float(rng.uniform(-0.9, 0.9))
     profile = tuple((r * wide, z + foot * (6.0 - z) / 4.0) for r, z in crown.profile)
     color = _tint(rng, 60, 190, 0.5)
-    return Crown(profile, color, _one_of((Tex.LEAVES, Tex.LEAVES, Tex.GRASS), rng), _tint(rng, 50, 200, 0.2))
+    return Crown(profile, color, one_of((Tex.LEAVES, Tex.LEAVES, Tex.GRASS), rng), _tint(rng, 50, 200, 0.2))
