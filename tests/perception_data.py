@@ -40,7 +40,8 @@ def make_frame(index: int, center_distance: float = 0.0, hazard: bool = False, c
     image = column_image(center_distance, hazard)
     command = (Command.LEFT, Command.STRAIGHT, Command.RIGHT)[index // 4 % 3]
     clean, driven = Control(0.5, 0.0, 0.1), Control(0.5, 0.0, -0.2)
-    return Frame(index, index / 10, 5.0, command, labels, driven, clean, image, camera, camera / 2, 0.1)
+    inside = index % 8 == 7
+    return Frame(index, index / 10, 5.0, command, labels, driven, clean, image, camera, camera / 2, 0.1, None, inside)
 
 
 def record(folder: Path, n_episodes: int = 3, n_frames: int = 40, n_cameras: int = 2) -> Path:

@@ -84,6 +84,13 @@ def test_each_camera_has_the_labels_of_its_own_place(episode: Episode) -> None:
         assert turned == pytest.approx(right.camera_yaw - left.camera_yaw, abs=0.15)
 
 
+def test_frames_inside_a_junction_are_marked(tmp_path: Path) -> None:
+    before_turns = replace(TINY, episodes=1, duration=9.0, cars=0, people=0, before_signs=0.0, before_turns=1.0, seed=3)
+    list(collect(before_turns, tmp_path))
+    inside = read_episode(episode_path(tmp_path, 0)).columns["junction"]
+    assert 0.05 < inside.mean() < 0.95
+
+
 def test_the_cameras_see_different_pictures_that_change(episode: Episode) -> None:
     assert len(set(episode.jpegs)) > 50
 

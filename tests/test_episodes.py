@@ -99,7 +99,7 @@ def test_missing_damaged_and_foreign_files_are_told_apart(path: Path, tmp_path: 
 
 def test_another_version_is_refused(path: Path) -> None:
     table = pq.read_table(path)
-    metadata = {b"caldrive": table.schema.metadata[b"caldrive"].replace(b'"version": 1', b'"version": 99')}
+    metadata = {b"caldrive": table.schema.metadata[b"caldrive"].replace(b'"version": 2', b'"version": 99')}
     pq.write_table(table.replace_schema_metadata(metadata), path)
     with pytest.raises(EpisodeError, match="format 99"):
         read_episode(path)

@@ -107,6 +107,15 @@ def test_a_command_comes_20_m_before_its_junction_and_ends_with_it(town: RoadNet
                 assert route.command_at(turn.end + 0.01) is Command.STRAIGHT
 
 
+def test_a_junction_is_where_its_turn_is(town: RoadNetwork) -> None:
+    for _, _, route in some_routes(town, 10):
+        for turn in route.turns:
+            assert route.inside_junction((turn.start + turn.end) / 2)
+        outside = [s for s in np.arange(0.0, route.length, 3.0) if not any(t.start <= s <= t.end for t in route.turns)]
+        assert outside
+        assert not any(map(route.inside_junction, outside))
+
+
 def test_before_the_first_command_the_command_is_straight(town01: RoadNetwork) -> None:
     for _, _, route in some_routes(town01, 20):
         if route.turns and route.turns[0].start > COMMAND_AHEAD + 1:

@@ -17,6 +17,13 @@ def test_rare_classes_are_drawn_more_often(frames: Frames) -> None:
     assert hazard[keen.draw(0, 2000)].mean() > 1.5 * hazard.mean()
 
 
+def test_junctions_are_drawn_more_often_than_the_streets_between(frames: Frames) -> None:
+    inside = frames.junction
+    even, keen = (Sampler(frames, 1, balance, seed=0) for balance in (0.0, 1.0))
+    assert inside[even.draw(0, 2000)].mean() == pytest.approx(inside.mean(), abs=0.04)
+    assert inside[keen.draw(0, 2000)].mean() > 1.5 * inside.mean()
+
+
 def test_class_counts_expect_what_is_drawn(frames: Frames) -> None:
     sampler = Sampler(frames, 3, 0.7, seed=0)
     ids = (sampler.draw(0, 4000)[:, None] + np.arange(3)).ravel()

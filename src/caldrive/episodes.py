@@ -25,11 +25,12 @@ from caldrive.datatypes import Affordances, Command, Control, Image, Scenario
 from caldrive.files import write_whole
 from caldrive.scenarios import scenario_from_json, scenario_to_json
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 METADATA_KEY = b"caldrive"
 JPEG_QUALITY = 90
 LABELS = tuple(f.name for f in fields(Affordances))
 CONTROLS = tuple(f.name for f in fields(Control))
+PLAIN = ("camera", "camera_left", "camera_yaw", "time", "speed", "junction")
 
 SCHEMA = pa.schema(
     [
@@ -38,6 +39,7 @@ SCHEMA = pa.schema(
         ("camera", pa.int64()),
         *((name, pa.float64()) for name in ("camera_left", "camera_yaw", "time", "speed")),
         ("command", pa.string()),
+        ("junction", pa.bool_()),
         *((name, pa.int64() if name == "speed_sign" else pa.float64()) for name in LABELS),
         *((f"{kind}_{name}", pa.float64()) for kind in ("driven", "clean") for name in CONTROLS),
         ("image", pa.binary()),
@@ -57,6 +59,7 @@ class Frame:
     index: number of the moment, from 0. camera: its id, with its lateral offset (m, + left) and yaw (rad, + left).
     affordances: the labels as of a car that stands where the camera looks from. driven: the control that moved the car,
     clean: what the driver wanted before any noise was added. semantic (H, W): the class of each pixel, by number.
+    junction: whether the car is inside one, where no line is painted.
     """
 
     index: int
@@ -71,13 +74,14 @@ class Frame:
     camera_left: float = 0.0
     camera_yaw: float = 0.0
     semantic: NDArray[np.uint8] | None = None
+    junction: bool = False
 
 
 def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
     labels = asdict(frame.affordances) | {"speed_sign": frame.affordances.speed_sign or 0}
     driven = {f"driven_{name}": value for name, value in asdict(frame.driven).items()}
     clean = {f"clean_{name}": value for name, value in asdict(frame.clean).items()}
-    plain = {name: getattr(frame, name) for name in ("camera", "camera_left", "camera_yaw", "time", "speed")}
+    plain = {name: getattr(frame, name) for name in PLAIN}
     # 4:4:4 keeps the colour of lamps that are a pixel or two wide.
     jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
     named = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
@@ -133,9 +137,9 @@ class EpisodeWriter:
 class Episode:
     """A recording in memory: columns (N,) by name, images still as JPEG.
 
-    columns: episode, frame, camera, camera_left, camera_yaw, time, speed, command (the values of `Command`), the six
-    labels (speed_sign is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera, then by
-    frame. semantics: a zipped byte a pixel for each row, where they were recorded and asked for.
+    columns: episode, frame, camera, camera_left, camera_yaw, time, speed, command (the values of `Command`), junction,
+    the six labels (speed_sign is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera,
+    then by frame. semantics: a zipped byte a pixel for each row, where they were recorded and asked for.
     """
 
     path: Path
@@ -196,6 +200,7 @@ class Episode:
             value["camera_left"],
             value["camera_yaw"],
             self.semantic(i) if self.semantics is not None else None,
+            value["junction"],
         )
 
     def __iter__(self) -> Iterator[Frame]:

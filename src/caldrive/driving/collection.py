@@ -65,13 +65,14 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
         for index, observation in enumerate(_moments(world, config)):
             clean = agent.act(observation)
             driven = disturbance.apply(clean, observation.speed)
+            inside = world.route.inside_junction(world.progress)
             semantics = world.semantic_images(mounts) if config.semantic else [None] * len(mounts)
             seen = zip(mounts, world.images(mounts), semantics, strict=True)
             for camera, (mount, image, semantic) in enumerate(seen):
                 labels = world.labels_at(mount.left, mount.yaw)
                 writer.append(
                     Frame(index, observation.time, observation.speed, observation.command, labels, driven, clean,
-                          image, camera, mount.left, mount.yaw, semantic)
+                          image, camera, mount.left, mount.yaw, semantic, inside)
                 )  # fmt: skip
             frames += len(mounts)
             world.step(driven)

@@ -61,6 +61,10 @@ class Frames:
             np.digitize(np.abs(np.concatenate([e.columns[name] for e in episodes])), edges)
             for name, edges in SIZES.items()
         ]
+        self.junction = np.concatenate([e.columns["junction"] for e in episodes])
+        self._manoeuvre = (
+            2 * self.command + self.junction
+        )  # what each command asks for inside a junction, and before it
         self._standing = np.concatenate([e.columns["speed"] for e in episodes]) < 0.1
         self.stream_start = self._stream_starts(episodes)
         lengths = [len(e) for e in episodes]
@@ -141,8 +145,8 @@ class Frames:
 
     def rarity(self, balance: float) -> NDArray[np.float64]:
         """For each frame (N,): (1 / frequency) ** balance of its rarest class; of classes are the discrete affordances,
-        the command, and the sizes of what is continuous."""
-        numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self.command, *self._sizes]
+        the command inside a junction and elsewhere, and the sizes of what is continuous."""
+        numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self._manoeuvre, *self._sizes]
         frequencies = [(np.bincount(number) / len(self))[number] for number in numbers]
         rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
         return (1 / rarest) ** balance * np.where(self._standing, STANDING**balance, 1.0)

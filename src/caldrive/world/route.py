@@ -45,6 +45,10 @@ class Route:
                 return turn.command
         return Command.STRAIGHT
 
+    def inside_junction(self, s: float) -> bool:
+        """Whether this place lies in a junction, whatever the command."""
+        return any(turn.start <= s <= turn.end for turn in self.turns)
+
     @property
     def time_limit(self) -> float:
         """Seconds to drive the route at 10 km/h (section 4)."""
