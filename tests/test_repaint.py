@@ -10,12 +10,13 @@ from torch import Generator, Tensor
 from caldrive.config import TrainingConfig
 from caldrive.episodes import EpisodeWriter
 from caldrive.perception.images import to_float
-from caldrive.perception.repaint import FREEDOM, Repaint, repaint
+from caldrive.perception.repaint import COVERED, FREEDOM, Repaint, repaint
 from caldrive.perception.training import train
 from caldrive.world.semantics import Semantic
 from tests.perception_data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame
 
 ALL = Repaint(share=1.0, grain=0.0)
+PATCHES = Repaint(share=1.0, tint=0.0, light=0.0, plain=0.0, grain=0.0, patches=12)
 
 
 def scene(n: int = 4) -> tuple[Tensor, np.ndarray]:
@@ -31,7 +32,15 @@ def painted(config: Repaint, groups: list[int], seed: int = 0) -> Tensor:
 
 
 def test_every_class_has_its_freedom() -> None:
-    assert len(FREEDOM) == len(Semantic)
+    assert len(FREEDOM) == len(COVERED) == len(Semantic)
+
+
+def test_patches_cover_what_stands_beside_the_road_and_nothing_on_it() -> None:
+    change = (painted(PATCHES, list(range(40))) - scene(40)[0]).abs().mean(dim=(0, 1, 3))  # by row, which is the class
+    on_it = [Semantic.ROAD, Semantic.LINE, Semantic.LIGHT, Semantic.SIGN, Semantic.VEHICLE, Semantic.PERSON]
+    assert float(change[on_it].max()) < 1e-6
+    assert change[Semantic.BUILDING] > 0.02
+    assert change[Semantic.SIDEWALK] > 0.02
 
 
 def test_lights_and_signs_keep_their_colours_and_houses_do_not() -> None:
@@ -44,7 +53,7 @@ def test_lights_and_signs_keep_their_colours_and_houses_do_not() -> None:
 
 
 def test_a_class_changes_by_one_rule_throughout_a_picture() -> None:
-    plain = Repaint(share=1.0, grain=0.0, plain=0.0)
+    plain = Repaint(share=1.0, grain=0.0, plain=0.0, patches=0)
     found, before = painted(plain, [0]), scene(1)[0]
     factors = (found / before)[0, :, Semantic.ROAD]  # (3, W)
     assert float(factors.std(dim=1).max()) < 1e-3

@@ -1,7 +1,8 @@
 """Towns in other colours: an augmentation that paints each class of things anew, by the semantic images of a recording.
 
-A network that has seen one town only takes its paint for what matters: red sidewalks or grey ones. What tells lanes,
-lights and signs apart keeps its colours. The semantic image is used in training only, never when driving.
+A network that has seen one town only takes its paint for what matters: red sidewalks or grey ones, and a yellow gate
+for a yellow car. What tells lanes, lights and signs apart keeps its colours. The semantic image is used in training
+only, never when driving.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from torch.nn.functional import interpolate
 # plant, furniture, light, sign, vehicle, person.
 FREEDOM = (0.5, 0.5, 0.2, 1.0, 1.0, 1.0, 0.8, 0.8, 0.0, 0.0, 0.4, 0.4)
 SCALES = (1, 2, 4, 8)  # pixels of a grain
+# What patches may cover: the sky, sidewalks, ground, buildings, plants and furniture.
+COVERED = np.array((1, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0), bool)
 
 
 @dataclass(frozen=True)
 class Repaint:
     """share: of the frames. tint: largest change of a channel's factor. light: largest change of a class's brightness,
     as a factor's logarithm. plain: largest share of one single colour in a class. grain: deviation of the noise on it.
+    patches: most rectangles of any colour, with at most half the image's height and a quarter of its width.
     """
 
     share: float = 0.5
@@ -31,6 +35,7 @@ class Repaint:
     light: float = 0.5
     plain: float = 0.8
     grain: float = 0.12
+    patches: int = 12
 
 
 def _tables(n: int, config: Repaint, generator: Generator) -> tuple[Tensor, Tensor, Tensor]:
@@ -54,6 +59,20 @@ def _grains(n: int, height: int, width: int, generator: Generator) -> Tensor:
     return interpolate(small, scale_factor=scale)[..., :height, :width].reshape(n, -1, 1)
 
 
+def _patch(images: Tensor, kinds: NDArray[np.uint8], rows: Tensor, groups: Tensor, most: int, seed: int) -> None:
+    """Rectangles of any colour on what stands beside the road: a yellow gate is neither a car nor a person."""
+    height, width = images.shape[2:]
+    for row in rows.tolist():
+        rng = np.random.default_rng((seed, int(groups[row])))
+        for _ in range(int(rng.integers(0, most + 1))):
+            h, w = (int(rng.integers(1, limit)) for limit in (height // 2 + 1, width // 4 + 1))
+            y, x = int(rng.integers(height - h)), int(rng.integers(width - w))
+            free = torch.from_numpy(COVERED[kinds[row, y : y + h, x : x + w]])
+            area = images[row, :, y : y + h, x : x + w]
+            color = torch.from_numpy(rng.random((3, 1, 1), dtype=np.float32))
+            area.copy_(torch.where(free, color, area))
+
+
 def repaint(
     images: Tensor, semantics: NDArray[np.uint8], groups: Tensor, generator: Generator, config: Repaint | None = None
 ) -> Tensor:
@@ -67,6 +86,8 @@ def repaint(
     own, grey, grain = _tables(n, config, generator)
     if not len(rows):
         return images
+    seed = int(torch.randint(2**31, (1,), generator=generator))
+    _patch(images, semantics, rows, groups, config.patches, seed)
     height, width = images.shape[2:]
     pixels = images.permute(0, 2, 3, 1).view(len(images), -1, 3)
     kinds = torch.from_numpy(semantics.reshape(len(images), -1)).long()[rows]
