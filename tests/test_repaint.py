@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,14 @@ from torch import Generator, Tensor
 from caldrive.config import TrainingConfig
 from caldrive.episodes import EpisodeWriter
 from caldrive.perception.images import to_float
-from caldrive.perception.repaint import COVERED, FREEDOM, Repaint, repaint
+from caldrive.perception.repaint import COVERED, FREEDOM, SHADED, Repaint, repaint
 from caldrive.perception.training import train
 from caldrive.world.semantics import Semantic
 from tests.perception_data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame
 
-ALL = Repaint(share=1.0, grain=0.0)
-PATCHES = Repaint(share=1.0, tint=0.0, light=0.0, plain=0.0, grain=0.0, patches=12)
+ALL = Repaint(share=1.0, grain=0.0, patches=0, shadows=0)
+PATCHES = Repaint(share=1.0, tint=0.0, light=0.0, plain=0.0, grain=0.0, patches=12, shadows=0)
+SHADOWS = replace(PATCHES, patches=0, shadows=3)
 
 
 def scene(n: int = 4) -> tuple[Tensor, np.ndarray]:
@@ -32,7 +34,16 @@ def painted(config: Repaint, groups: list[int], seed: int = 0) -> Tensor:
 
 
 def test_every_class_has_its_freedom() -> None:
-    assert len(FREEDOM) == len(COVERED) == len(Semantic)
+    assert len(FREEDOM) == len(COVERED) == len(SHADED) == len(Semantic)
+
+
+def test_shadows_fall_on_the_ground_and_on_nothing_that_stands() -> None:
+    images, semantics = scene(40)
+    found = repaint(images.clone(), semantics, torch.arange(40), Generator().manual_seed(0), SHADOWS)
+    changed = ((found - images).abs() > 0.02).float().mean(dim=(0, 1, 3))
+    ground = [Semantic.ROAD, Semantic.LINE, Semantic.SIDEWALK, Semantic.GROUND]
+    assert float(changed[ground].min()) > 0.2
+    assert float(changed[[k for k in Semantic if k not in ground]].max()) == 0
 
 
 def test_patches_cover_what_stands_beside_the_road_and_nothing_on_it() -> None:
@@ -53,7 +64,7 @@ def test_lights_and_signs_keep_their_colours_and_houses_do_not() -> None:
 
 
 def test_a_class_changes_by_one_rule_throughout_a_picture() -> None:
-    plain = Repaint(share=1.0, grain=0.0, plain=0.0, patches=0)
+    plain = Repaint(share=1.0, grain=0.0, plain=0.0, patches=0, shadows=0)
     found, before = painted(plain, [0]), scene(1)[0]
     factors = (found / before)[0, :, Semantic.ROAD]  # (3, W)
     assert float(factors.std(dim=1).max()) < 1e-3

@@ -21,13 +21,15 @@ FREEDOM = (0.5, 0.5, 0.2, 1.0, 1.0, 1.0, 0.8, 0.8, 0.0, 0.0, 0.4, 0.4)
 SCALES = (1, 2, 4, 8)  # pixels of a grain
 # What patches may cover: the sky, sidewalks, ground, buildings, plants and furniture.
 COVERED = np.array((1, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0), bool)
+SHADED = np.array((0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0), bool)  # what shadows fall on: road, lines, sidewalk, ground
 
 
 @dataclass(frozen=True)
 class Repaint:
     """share: of the frames. tint: largest change of a channel's factor. light: largest change of a class's brightness,
     as a factor's logarithm. plain: largest share of one single colour in a class. grain: deviation of the noise on it.
-    patches: most rectangles of any colour, with at most half the image's height and a quarter of its width.
+    patches: most rectangles of any colour, with at most half the image's height and a quarter of its width. shadows:
+    most shadows of houses that are not in the picture, or gaps of light between them.
     """
 
     share: float = 0.5
@@ -36,6 +38,7 @@ class Repaint:
     plain: float = 0.8
     grain: float = 0.12
     patches: int = 12
+    shadows: int = 3
 
 
 def _tables(n: int, config: Repaint, generator: Generator) -> tuple[Tensor, Tensor, Tensor]:
@@ -73,6 +76,19 @@ def _patch(images: Tensor, kinds: NDArray[np.uint8], rows: Tensor, groups: Tenso
             area.copy_(torch.where(free, color, area))
 
 
+def _shade(images: Tensor, kinds: NDArray[np.uint8], rows: Tensor, groups: Tensor, most: int, seed: int) -> None:
+    """Shadows and light with straight edges on the ground, as a house's edge throws them: no lane ends there."""
+    y, x = np.mgrid[0 : images.shape[2], 0 : images.shape[3]].astype(np.float32)
+    for row in rows.tolist():
+        rng = np.random.default_rng((seed, 1, int(groups[row])))
+        for _ in range(int(rng.integers(0, most + 1))):
+            angle, through = rng.uniform(0, 2 * np.pi), rng.random(2) * images.shape[2:]
+            beyond = (y - through[0]) * np.sin(angle) + (x - through[1]) * np.cos(angle)
+            inside = (beyond > 0) & (beyond < rng.uniform(0.1, 2.0) * images.shape[3]) & SHADED[kinds[row]]
+            factor = np.where(inside, np.float32(np.exp(rng.uniform(-1.1, 0.5))), np.float32(1))
+            images[row].mul_(torch.from_numpy(factor)).clamp_(max=1)
+
+
 def repaint(
     images: Tensor, semantics: NDArray[np.uint8], groups: Tensor, generator: Generator, config: Repaint | None = None
 ) -> Tensor:
@@ -88,6 +104,7 @@ def repaint(
         return images
     seed = int(torch.randint(2**31, (1,), generator=generator))
     _patch(images, semantics, rows, groups, config.patches, seed)
+    _shade(images, semantics, rows, groups, config.shadows, seed)
     height, width = images.shape[2:]
     pixels = images.permute(0, 2, 3, 1).view(len(images), -1, 3)
     kinds = torch.from_numpy(semantics.reshape(len(images), -1)).long()[rows]
