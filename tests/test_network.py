@@ -18,6 +18,12 @@ HAZARD = next(s for s in SPECS if s.name == "hazard_stop")
 F = 12
 
 
+@pytest.fixture(autouse=True)
+def _same_weights() -> None:
+    """Drawn anew for each run, six ReLUs are all off once in 64 runs."""
+    torch.manual_seed(0)
+
+
 def test_the_backbone_is_vgg16() -> None:
     convolutions = Backbone(1.0).convolutions()
     assert len(convolutions) == 13
