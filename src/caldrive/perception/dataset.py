@@ -62,9 +62,8 @@ class Frames:
             for name, edges in SIZES.items()
         ]
         self.junction = np.concatenate([e.columns["junction"] for e in episodes])
-        self._manoeuvre = (
-            2 * self.command + self.junction
-        )  # what each command asks for inside a junction, and before it
+        # Each command asks for one thing inside a junction, for another before it.
+        self._manoeuvre = 2 * self.command + self.junction
         self._standing = np.concatenate([e.columns["speed"] for e in episodes]) < 0.1
         self.stream_start = self._stream_starts(episodes)
         lengths = [len(e) for e in episodes]
