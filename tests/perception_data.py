@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,12 +45,14 @@ def make_frame(index: int, center_distance: float = 0.0, hazard: bool = False, c
     return Frame(index, index / 10, 5.0, command, labels, driven, clean, image, camera, camera / 2, 0.1, None, inside)
 
 
-def record(folder: Path, n_episodes: int = 3, n_frames: int = 40, n_cameras: int = 2) -> Path:
-    """Episodes whose column wanders, with a hazard now and then."""
-    rng = np.random.default_rng(0)
+def record(folder: Path, n_episodes: int = 3, n_frames: int = 40, n_cameras: int = 2, semantic: bool = False) -> Path:
+    """Episodes whose column wanders, with a hazard now and then; semantic images of noise."""
+    rng, classes = np.random.default_rng(0), np.random.default_rng(1)
     for episode in range(n_episodes):
         with EpisodeWriter(folder / f"episode{episode}.parquet", SCENARIO) as writer:
             for index in range(n_frames):
                 for camera in range(n_cameras):
-                    writer.append(make_frame(index, float(rng.uniform(-1, 1)), bool(rng.random() < 0.15), camera))
+                    frame = make_frame(index, float(rng.uniform(-1, 1)), bool(rng.random() < 0.15), camera)
+                    seen = classes.integers(0, 8, (HEIGHT, WIDTH), dtype=np.uint8) if semantic else None
+                    writer.append(replace(frame, semantic=seen))
     return folder

@@ -9,12 +9,11 @@ import torch
 from torch import Generator, Tensor
 
 from caldrive.config import TrainingConfig
-from caldrive.episodes import EpisodeWriter
 from caldrive.perception.images import to_float
 from caldrive.perception.repaint import COVERED, FREEDOM, SHADED, Repaint, repaint
 from caldrive.perception.training import train
 from caldrive.world.semantics import Semantic
-from tests.perception_data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame
+from tests.perception_data import TINY, record
 
 ALL = Repaint(share=1.0, grain=0.0, patches=0, shadows=0)
 PATCHES = Repaint(share=1.0, tint=0.0, light=0.0, plain=0.0, grain=0.0, patches=12, shadows=0)
@@ -90,15 +89,11 @@ def test_a_share_of_the_pictures_stays_as_it_is() -> None:
 
 
 def test_training_paints_where_the_recording_tells_how(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
     for semantic in (False, True):
-        for episode in range(3):
-            with EpisodeWriter(tmp_path / str(semantic) / f"e{episode}.parquet", SCENARIO) as writer:
-                for index in range(12):
-                    frame = make_frame(index, 0.1, hazard=index % 3 == 0)
-                    classes = rng.integers(0, 8, (HEIGHT, WIDTH), dtype=np.uint8) if semantic else None
-                    writer.append(type(frame)(**{**vars(frame), "semantic": classes}))
-    config = TrainingConfig(steps=2, batch=4, warm_up=1, evaluate_every=9, precision="fp32", validation_share=0.3)
+        record(tmp_path / str(semantic), semantic=semantic)
+    config = TrainingConfig(
+        steps=2, batch=4, warm_up=1, segmentation=0.0, evaluate_every=9, precision="fp32", validation_share=0.3
+    )
     first, second = (
         train(config, tmp_path / name, tmp_path / f"out{name}", TINY, progress=False) for name in ("False", "True")
     )

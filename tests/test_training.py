@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import platform
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +16,7 @@ from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate, outputs_of, use_bf16
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
+from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import learning_rate
 from caldrive.perception.training import train
@@ -153,3 +155,7 @@ def test_bfloat16_is_used_where_it_is_faster(
     assert use_bf16("auto", "cpu") is pays
     assert use_bf16("bf16", "cpu")
     assert use_bf16("auto", "cuda")
+
+
+def test_memory_is_kept_where_the_system_can() -> None:
+    assert keep_memory() is (platform.libc_ver()[0] == "glibc")

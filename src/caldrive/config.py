@@ -119,8 +119,8 @@ class CollectConfig:
     """
 
     town: str = "town01"
-    weathers: tuple[int, ...] = (1, 3, 6, 8)
-    episodes: int = 330
+    weathers: tuple[int, ...] = (1, 3, 1, 6, 8)
+    episodes: int = 400
     duration: float = 30.0
     cars: int = 75
     people: int = 70
@@ -128,7 +128,7 @@ class CollectConfig:
     before_signs: float = 0.4
     before_turns: float = 0.4
     displaced: float = 0.25
-    rearranged: float = 0.7
+    rearranged: float = 0.85
     hidden_cars: float = 0.1
     width: int = 200
     height: int = 88
@@ -197,6 +197,7 @@ class TrainingConfig:
     """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
+    segmentation: weight of the second lesson's loss, where the recording has semantic images; 0 leaves it out.
     balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu, cuda, or
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
@@ -211,6 +212,7 @@ class TrainingConfig:
     clip: float = 5.0
     balance: float = 0.5
     augment: bool = True
+    segmentation: float = 0.5
     validation_share: float = 0.05
     evaluate_every: int = 1000
     save_every: int = 100

@@ -42,10 +42,11 @@ def makings(driver: DriverSettings) -> dict[str, Any]:
     """What results depend on in the process that drives: code, network, and the precision in which it computes."""
     if driver.agent != "cal":
         return {"code": code_version(), "model": None, "precision": None}
-    from caldrive.perception.evaluation import use_bf16  # with torch, which the oracle does without
+    from caldrive.perception.checkpoint import load_network  # with torch, which the oracle does without
+    from caldrive.perception.predictor import resolve
 
-    precision = "bf16" if use_bf16("auto", "cpu") else "fp32"
-    return {"code": code_version(), "model": _digest(model_path(driver.model)), "precision": precision}
+    path = model_path(driver.model)
+    return {"code": code_version(), "model": _digest(path), "precision": resolve("auto", load_network(path)[1])}
 
 
 def _machine() -> str:

@@ -49,7 +49,7 @@ class Backbone(nn.Module):
     def __init__(self, width: float = 1.0, batch_norm: bool = False) -> None:
         super().__init__()
         self.width = width
-        channels = [max(1, round(width * c)) for c in CHANNELS]
+        self.channels = channels = [max(1, round(width * c)) for c in CHANNELS]
         self.stages, self.norms = nn.ModuleList(), nn.ModuleList()
         n_in = 3
         for n_out, depth in zip(channels, DEPTHS, strict=True):
@@ -71,13 +71,18 @@ class Backbone(nn.Module):
         return self.n_channels * (height // 32) * (width // 32)
 
     def forward(self, images: Tensor) -> Tensor:
-        x = images
+        return self.maps(images)[-1].flatten(1)
+
+    def maps(self, images: Tensor) -> list[Tensor]:
+        """What each of the five stages makes of images (N, 3, H, W): the k-th (N, C, H // 2**k, W // 2**k)."""
+        x, found = images, []
         for stage, norm in zip(self.stages, self.norms, strict=True):
             assert isinstance(stage, nn.ModuleList)
             for conv in stage[:-1]:
                 x = conv(x).relu_()
             x = norm(max_pool2d(stage[-1](x), 2)).relu_()
-        return x.flatten(1)
+            found.append(x)
+        return found
 
     def load_imagenet(self, path: Path | str) -> None:
         """Take the convolutions of a torchvision-style VGG16 (features.N.weight, features.N.bias) from a safetensors

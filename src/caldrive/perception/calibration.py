@@ -1,4 +1,4 @@
-"""Probabilities that mean what they say, after a training in which the rare was made frequent."""
+"""What is put right when a training ends: probabilities, as the rare was made frequent, and the ranges of 8 bits."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import copy
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor, nn
 
+from caldrive.perception.backbone import Backbone
 from caldrive.perception.dataset import Frames
 from caldrive.perception.network import Network
 from caldrive.perception.specs import ClassWeights
+
+KEPT = 0.9999  # share of the values that a range holds; the few beyond it are clipped
 
 
 def calibrated(
@@ -30,3 +34,21 @@ def calibrated(
         bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
         bias.data += (shift - shift[0]).to(bias.device)
     return network
+
+
+@torch.no_grad()
+def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
+    """For each convolution the largest size of what enters it, from normalised images (N, 3, H, W)."""
+    found: list[float] = []
+
+    def note(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
+        sizes = inputs[0].abs().float().flatten()
+        found.append(float(sizes.kthvalue(max(1, round(KEPT * len(sizes)))).values))
+
+    hooks = [conv.register_forward_pre_hook(note) for conv in backbone.convolutions()]
+    try:
+        backbone(images)
+    finally:
+        for hook in hooks:
+            hook.remove()
+    return tuple(found)

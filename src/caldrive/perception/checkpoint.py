@@ -29,14 +29,15 @@ class CheckpointError(ValueError):
 
 @dataclass(frozen=True)
 class CheckpointInfo:
-    """What is known of a trained network: its configuration, its data, its validation metrics, and how it was
-    trained."""
+    """What is known of a trained network: its configuration, its data, its validation metrics, how it was trained, and
+    the range of what enters each of its convolutions (empty where nobody looked)."""
 
     config: PerceptionConfig
     data: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, float] = field(default_factory=dict)
     training: dict[str, Any] = field(default_factory=dict)
     seed: int = 0
+    ranges: tuple[float, ...] = ()
 
 
 def config_from_dict(values: dict[str, Any]) -> PerceptionConfig:
@@ -115,5 +116,6 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         raise CheckpointError(
             f"the weights in {path} do not fit its own configuration: train the network anew"
         ) from error
-    info = CheckpointInfo(config, header["data"], header["metrics"], header["training"], header["seed"])
+    ranges = tuple(header.get("ranges", ()))
+    info = CheckpointInfo(config, header["data"], header["metrics"], header["training"], header["seed"], ranges)
     return network.eval(), info

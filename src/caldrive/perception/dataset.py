@@ -70,7 +70,7 @@ class Frames:
         self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
         self.town = np.repeat([e.scenario.town for e in episodes], lengths)
         self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
-        self._semantic = all(e.semantics is not None for e in episodes)
+        self.has_semantics = all(e.semantics is not None for e in episodes)
         self._pool = ThreadPoolExecutor(2)
         self._cache: NDArray[np.uint8] | None = None
         if len(self) * size[0] * size[1] * 3 <= cache_gb * 1e9:
@@ -111,7 +111,7 @@ class Frames:
 
     def semantics(self, ids: Ids) -> NDArray[np.uint8] | None:
         """Semantic images (N, H, W) of frames by number, where all episodes have them."""
-        if not self._semantic:
+        if not self.has_semantics:
             return None
         chosen = (self._where[i] for i in ids.tolist())
         return np.stack(list(self._pool.map(lambda where: where[0].semantic(where[1], self.size), chosen)))

@@ -34,7 +34,7 @@ def _bf16_pays() -> bool:
 def use_bf16(precision: str, device: str) -> bool:
     """Whether to compute in bfloat16; `auto` does where that is faster than fp32."""
     if precision not in ("auto", "fp32", "bf16"):
-        raise ValueError(f"precision is {precision!r}, but must be auto, fp32 or bf16")
+        raise ValueError(f"precision is {precision!r}, but must be auto, fp32 or bf16 (int8 only drives)")
     if precision != "auto":
         return precision == "bf16"
     return device != "cpu" or _bf16_pays()

@@ -73,15 +73,10 @@ class TaskBlock(nn.Module):
 
     def forward(self, features: Tensor, command: Tensor) -> Tensor:
         """Features (B, T, F) and the commands (B, S) of the last S frames to outputs (B * S, outputs)."""
-        T, S = features.shape[1], command.shape[1]
-        back = torch.arange(self.config.length - 1, -1, -1, device=features.device) * self.config.dilation
-        now = torch.arange(T - S, T, device=features.device)
-        # Before the first frame there is the first frame again: the same rule in training and when driving.
-        sequence = features[:, (now[:, None] - back).clamp(min=0)].flatten(0, 1)  # (B * S, length, F)
-        if len(self.groups) == 1:
-            result: Tensor = self.groups[0](sequence)
+        sequence, command = self._sequences(features, command.shape[1]), command.flatten()
+        if len(self.groups) == 1 or len(command) == 1:  # at the wheel there is one frame and one command
+            result: Tensor = self.groups[int(command) if len(self.groups) > 1 else 0](sequence)
             return result
-        command = command.flatten()
         outputs = sequence.new_zeros(len(sequence), self.n_outputs)
         for number, group in enumerate(self.groups):
             active = (command == number).nonzero()[:, 0]
@@ -89,6 +84,16 @@ class TaskBlock(nn.Module):
                 output = group(sequence[active])
                 outputs = outputs.to(output.dtype).index_copy(0, active, output)
         return outputs
+
+    def _sequences(self, features: Tensor, n_last: int) -> Tensor:
+        """The frames that each of the last n_last frames is seen with: (B, T, F) to (B * n_last, length, F)."""
+        T = features.shape[1]
+        if self.config.length == 1:
+            return features[:, T - n_last :].flatten(0, 1)[:, None]
+        back = torch.arange(self.config.length - 1, -1, -1, device=features.device) * self.config.dilation
+        now = torch.arange(T - n_last, T, device=features.device)
+        # Before the first frame there is the first frame again: the same rule in training and when driving.
+        return features[:, (now[:, None] - back).clamp(min=0)].flatten(0, 1)
 
 
 class Network(nn.Module):

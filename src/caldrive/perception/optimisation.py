@@ -20,6 +20,7 @@ from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.repaint import repaint
 from caldrive.perception.sampler import Sampler
+from caldrive.perception.segmentation import STAGE, Segmentation, segmentation_loss
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
 
@@ -33,15 +34,20 @@ def learning_rate(step: int, config: TrainingConfig) -> float:
     return config.learning_rate * share
 
 
-class _Windows(nn.Module):
-    """The network as one call from images to outputs, which is what DistributedDataParallel looks after."""
+class Lessons(nn.Module):
+    """The network and its second lesson as one call, which is what DistributedDataParallel looks after."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, segmentation: Segmentation | None = None) -> None:
         super().__init__()
-        self.network = network
+        self.network, self.segmentation = network, segmentation
 
     def forward(self, images: Tensor, index: Tensor, command: Tensor) -> dict[str, Tensor]:
-        return self.network.on_windows(images, index, command)
+        """As `Network.on_windows`, and under `segmentation` the logits of that lesson."""
+        maps = self.network.backbone.maps(images)
+        outputs: dict[str, Tensor] = self.network(maps[-1].flatten(1)[index], command)
+        if self.segmentation is not None:
+            outputs["segmentation"] = self.segmentation(maps[STAGE])
+        return outputs
 
 
 @dataclass
@@ -49,7 +55,7 @@ class Run:
     """A training run: what changes from step to step, and what is needed to change it."""
 
     config: TrainingConfig
-    network: Network
+    lessons: Lessons
     optimizer: Adam
     sampler: Sampler
     weights: ClassWeights
@@ -58,9 +64,13 @@ class Run:
     model: nn.Module = field(init=False)
 
     def __post_init__(self) -> None:
-        self.model = _Windows(self.network)
+        self.model = self.lessons
         if self.team.size > 1:  # a batch without some command leaves its group of nodes without a gradient
             self.model = DistributedDataParallel(self.model, find_unused_parameters=True)
+
+    @property
+    def network(self) -> Network:
+        return self.lessons.network
 
     def advance(self) -> float:
         """One step; returns its loss, where there are several processes that of this one's share of the batch."""
@@ -78,9 +88,12 @@ class Run:
         with autocast(config.precision, team.device):
             outputs = self.model(*(x.to(team.device) for x in (images, batch.index, batch.command)))
         total = loss(outputs, targets, self.weights)
+        if batch.semantics is not None and "segmentation" in outputs:
+            second = segmentation_loss(outputs["segmentation"], batch.semantics, generator)
+            total = total + config.segmentation * second
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), config.clip)
+        torch.nn.utils.clip_grad_norm_(self.lessons.parameters(), config.clip)
         self.optimizer.step()
         self.step += 1
         return float(total.detach())
@@ -96,7 +109,7 @@ class Run:
 
     def save(self, path: Path) -> None:
         """Write all that the next step depends on."""
-        tensors = {f"network.{name}": value for name, value in self.network.state_dict().items()}
+        tensors = {f"lessons.{name}": value for name, value in self.lessons.state_dict().items()}
         for number, state in self.optimizer.state_dict()["state"].items():
             tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
         header = {"step": self.step, "config": asdict(self.network.config), "training": asdict(self.config)}
@@ -109,8 +122,8 @@ class Run:
             raise CheckpointError(
                 f"{path} belongs to a run with other settings: give another folder or remove this one"
             )
-        network = {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}
-        self.network.load_state_dict(network)
+        known = {k.removeprefix("lessons."): v for k, v in tensors.items() if k.startswith("lessons.")}
+        self.lessons.load_state_dict(known)
         states: dict[int, dict[str, Tensor]] = {}
         for name, value in tensors.items():
             if name.startswith("optimizer."):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import torch
 from torch import Tensor
 
 from caldrive.datatypes import Affordances, Image, Observation
-from caldrive.perception.checkpoint import load_network
+from caldrive.perception.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.evaluation import use_bf16
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import COMMANDS, Network
@@ -22,20 +23,47 @@ class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
     """An image tells nothing, or the network makes nothing of it; the driver should brake."""
 
 
+def resolve(precision: str, info: CheckpointInfo) -> str:
+    """fp32, bf16 or int8. `auto` is int8 where the network's ranges are known, else what is faster of the others.
+
+    Raises ValueError for another word, and for int8 without ranges.
+    """
+    if precision == "int8" and not info.ranges:
+        raise ValueError("found a network without the ranges that int8 needs: train it anew, or take fp32")
+    if precision == "int8" or (precision == "auto" and info.ranges):
+        return "int8"
+    return "bf16" if use_bf16(precision, "cpu") else "fp32"
+
+
+def _backbone(network: Network, precision: str, info: CheckpointInfo) -> Callable[[Tensor], Tensor]:
+    """From a normalised image (1, 3, H, W) to features (1, F) in 32 bits."""
+    if precision == "int8":
+        from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which nothing else needs
+
+        config = network.config
+        size = config.image_height, config.image_width
+        return Int8Backbone(network.backbone, info.ranges, *size, torch.get_num_threads())
+    dtype = torch.bfloat16 if precision == "bf16" else torch.float32
+    network.backbone.to(dtype)
+    return lambda image: network.features(image.to(dtype)).float()
+
+
 class NetworkPerception:
     """Perception by a trained network: keeps the features of the last `span` frames of an episode.
 
-    Before the first frame there is the first frame again, as in training. precision: auto, fp32 or bf16 for the
-    backbone. threads: how many torch may use, None leaves that as it is. Raises BadImage, and then forgets nothing.
+    Before the first frame there is the first frame again, as in training. precision: of the backbone, see `precision`.
+    threads: how many it may use, None leaves that as it is. Raises BadImage, and then forgets nothing.
     """
 
     def __init__(self, network: Network | Path | str, precision: str = "auto", threads: int | None = None) -> None:
         if threads is not None:
             torch.set_num_threads(threads)
-        self.network = network if isinstance(network, Network) else load_network(network)[0]
-        self.network.eval()
-        self._dtype = torch.bfloat16 if use_bf16(precision, "cpu") else torch.float32
-        self.network.backbone.to(self._dtype)
+        if isinstance(network, Network):
+            network, info = network, CheckpointInfo(network.config)
+        else:
+            network, info = load_network(network)
+        self.network = network.eval()
+        self._features = _backbone(network, resolve(precision, info), info)
         self._history: Tensor | None = None  # (1, span, F)
 
     def reset(self) -> None:
@@ -46,8 +74,7 @@ class NetworkPerception:
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
         self._check(observation.image)
-        image = normalise(to_float(observation.image[None])).to(self._dtype)
-        feature = self.network.features(image).float()[:, None]  # (1, 1, F)
+        feature = self._features(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
         if not bool(feature.isfinite().all()):
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:

@@ -15,21 +15,24 @@ from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
-from caldrive.perception.calibration import calibrated
+from caldrive.perception.calibration import calibrated, input_ranges
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
 from caldrive.perception.curves import Board, draw_curves
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Run, learning_rate
+from caldrive.perception.optimisation import Lessons, Run, learning_rate
 from caldrive.perception.sampler import Sampler, summary
+from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.specs import class_weights
 from caldrive.perception.team import Team, join
 
 Row = dict[str, float]
 
-
+RANGED = 128  # frames on which the ranges of 8 bits are found
 MODEL, STATE, METRICS, CURVES = "model.safetensors", "state.safetensors", "metrics.jsonl", "curves.png"
 
 
@@ -60,19 +63,24 @@ def start(
     network = Network(perception) if initial is None else _initial(initial, perception)
     if imagenet is not None:
         network.backbone.load_imagenet(imagenet)
-    network = network.to(team.device)
+    head = None
+    if config.segmentation and frames.has_semantics:
+        head = Segmentation(network.backbone.channels[STAGE])
+    lessons = Lessons(network, head).to(team.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
     weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    return Run(config, network, Adam(network.parameters(), config.learning_rate), sampler, weights, team)
+    return Run(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
 
 
 def validate(run: Run, held: Frames, model: Path) -> Row:
     """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`."""
-    sampler = run.sampler
-    network = calibrated(run.network, sampler.frames, sampler.class_counts(), run.weights)
+    sampler, config = run.sampler, run.config
+    network = calibrated(run.network, sampler.frames, sampler.class_counts(), run.weights).eval()
     round_to_half(network)
-    found = evaluate(network, held, run.config.precision, run.team.device)
-    info = CheckpointInfo(network.config, summary(sampler.frames, held), found, asdict(run.config), run.config.seed)
+    found = evaluate(network, held, config.precision, run.team.device)
+    seen = normalise(to_float(sampler.frames.images(sampler.draw(0, RANGED))))
+    ranges = input_ranges(network.backbone, seen.to(run.team.device))
+    info = CheckpointInfo(network.config, summary(sampler.frames, held), found, asdict(config), config.seed, ranges)
     save_network(model, network, info, half=True)
     return {f"validation/{name}": value for name, value in found.items()}
 
@@ -94,10 +102,11 @@ def train(
     torchrun the processes share each batch out, and the first one writes.
     """
     out, perception = Path(out), perception or PerceptionConfig()
+    keep_memory()
     team = join(config.device, config.batch)
     size = (perception.image_height, perception.image_width)
     train_episodes, held_episodes = split(
-        find_episodes(data, semantic=config.augment), config.validation_share, config.seed
+        find_episodes(data, semantic=config.augment or config.segmentation > 0), config.validation_share, config.seed
     )
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
     known = (out / STATE).is_file()  # then what the run began with is needed no more
