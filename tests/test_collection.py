@@ -17,7 +17,8 @@ from caldrive.config import CollectConfig
 from caldrive.datatypes import Control
 from caldrive.driving import collection
 from caldrive.driving.collection import BASELINES, _record, collect, episode_path
-from caldrive.episodes import Episode, EpisodeError, read_episode
+from caldrive.episode_reader import Episode, read_episode
+from caldrive.episodes import EpisodeError
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.semantics import Semantic
 from caldrive.world.traffic import stop_sumo

@@ -10,7 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from caldrive.datatypes import Command
-from caldrive.episodes import EpisodeError, EpisodeWriter, read_episode
+from caldrive.episode_reader import read_episode
+from caldrive.episodes import EpisodeError, EpisodeWriter
 from caldrive.scenarios import scenario_from_json, scenario_to_json
 from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from caldrive.datatypes import Affordances, Image, Observation
-from caldrive.episodes import read_episode
+from caldrive.episode_reader import read_episode
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import outputs_of

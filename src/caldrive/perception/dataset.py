@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Command
-from caldrive.episodes import LABELS, Episode, EpisodeError
+from caldrive.episode_reader import Episode
+from caldrive.episodes import LABELS, EpisodeError
 from caldrive.perception.specs import SPECS, encode_columns
 
 Ids = NDArray[np.int64]

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from caldrive.episodes import Episode, EpisodeError, read_episode
+from caldrive.episode_reader import Episode, read_episode
+from caldrive.episodes import EpisodeError
 from caldrive.perception.specs import SPECS
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from caldrive.episodes import Episode, EpisodeError, read_episode
+from caldrive.episode_reader import Episode, read_episode
+from caldrive.episodes import EpisodeError
 from caldrive.files import write_figure
 from caldrive.perception.evaluation import Done, unwatched
 from caldrive.perception.folders import class_counts, episode_paths
