@@ -76,6 +76,15 @@ def test_a_run_does_not_begin_with_a_network_of_another_kind(folder: Path, tmp_p
         train(still, folder, tmp_path / "third", replace(TINY, width=0.5), progress=False)
 
 
+def test_what_the_weights_do_not_depend_on_may_change_under_way(folder: Path, tmp_path: Path) -> None:
+    whole = train(SHORT, folder, tmp_path / "whole", TINY, progress=False)
+    train(SHORT, folder, tmp_path / "killed", TINY, progress=False, stop=lambda step: step == 4)
+    other = replace(SHORT, save_every=3, evaluate_every=5, cache_gb=0.0)
+    found = (load_network(train(other, folder, tmp_path / "killed", TINY, progress=False)), load_network(whole))
+    weights = [network.state_dict() for network, _ in found]
+    assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
+
+
 def test_a_state_of_other_settings_is_not_taken_up(folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 2)
     with pytest.raises(CheckpointError, match="other settings"):

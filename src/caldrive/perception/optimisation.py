@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -24,6 +25,8 @@ from caldrive.perception.segmentation import STAGE, Segmentation, segmentation_l
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
 
+FREE = ("initial", "evaluate_every", "save_every", "cache_gb")  # may change while a training is under way
+
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
     """Rate of a step: a straight warm-up, then a cosine down to final_rate of the base rate."""
@@ -32,6 +35,11 @@ def learning_rate(step: int, config: TrainingConfig) -> float:
     done = (step - config.warm_up) / max(1, config.steps - config.warm_up)
     share = config.final_rate + (1 - config.final_rate) * (1 + math.cos(math.pi * done)) / 2
     return config.learning_rate * share
+
+
+def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
+    """Those of a training's settings on which its weights depend once it has begun."""
+    return {name: value for name, value in settings.items() if name not in FREE}
 
 
 class Lessons(nn.Module):
@@ -118,7 +126,8 @@ class Run:
     def restore(self, path: Path) -> None:
         """Take up where `save` left off. Raises CheckpointError where the file belongs to another run."""
         tensors, header = read_tensors(path)
-        if (header.get("config"), header.get("training")) != (asdict(self.network.config), asdict(self.config)):
+        same = _decisive(header.get("training", {})) == _decisive(asdict(self.config))
+        if not same or header.get("config") != asdict(self.network.config):
             raise CheckpointError(
                 f"{path} belongs to a run with other settings: give another folder or remove this one"
             )
