@@ -13,7 +13,8 @@ from caldrive.perception.checkpoint import CheckpointInfo, load_network, save_ne
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.int8 import Int8Backbone
 from caldrive.perception.network import Network
-from caldrive.perception.predictor import NetworkPerception, resolve
+from caldrive.perception.precision import resolve
+from caldrive.perception.predictor import NetworkPerception
 from tests.perception_data import HEIGHT, TINY, WIDTH, column_image
 from tests.test_predictor import see, values
 

@@ -10,9 +10,9 @@ from caldrive.datatypes import Affordances, Image, Observation
 from caldrive.episode_reader import read_episode
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.dataset import Frames
-from caldrive.perception.evaluation import outputs_of
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
+from caldrive.perception.optimisation import Lessons
 from caldrive.perception.predictor import BadImage, NetworkPerception
 from caldrive.perception.specs import decode
 from tests.perception_data import HEIGHT, TINY, WIDTH, column_image, make_frame, record
@@ -45,7 +45,7 @@ def test_driving_gives_what_the_whole_episode_gives(network: Network, tmp_path: 
     episode = read_episode(path)
     batch = Frames([episode], (HEIGHT, WIDTH)).batch(np.array([0]), 14, network.span - 1)
     with torch.no_grad():
-        whole = outputs_of(network, batch, normalise(to_float(batch.images)), "cpu")
+        whole = Lessons(network)(normalise(to_float(batch.images)), batch.index, batch.command)
     perception = NetworkPerception(network, "fp32")
     for i, frame in enumerate(episode):
         found = perception.predict(Observation(frame.time, frame.image, frame.speed, frame.command))

@@ -13,12 +13,13 @@ from torch import Tensor
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
 from caldrive.perception.dataset import Frames
-from caldrive.perception.evaluation import evaluate, outputs_of, use_bf16
+from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import learning_rate
+from caldrive.perception.optimisation import Lessons, learning_rate
+from caldrive.perception.precision import use_bf16
 from caldrive.perception.training import train
 from tests.perception_data import HEIGHT, TINY, WIDTH, record
 
@@ -106,10 +107,10 @@ def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, 
 def test_each_frame_passes_the_backbone_once(folder: Path) -> None:
     network, passed = Network(TINY).eval(), []
     frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
-    network.backbone.register_forward_hook(lambda module, args, output: passed.append(len(args[0])))
+    network.backbone.convolutions()[0].register_forward_hook(lambda module, args, output: passed.append(len(args[0])))
     starts = frames.starts(4)[:8]
     batch = frames.batch(starts, 4, network.span - 1)
-    outputs = outputs_of(network, batch, normalise(to_float(batch.images)), "cpu")
+    outputs = Lessons(network)(normalise(to_float(batch.images)), batch.index, batch.command)
     assert outputs["hazard_stop"].shape == (32, 2)
     assert passed == [11]  # eight windows of four that begin one frame apart
 
@@ -121,7 +122,7 @@ def test_windows_give_what_single_frames_give(folder: Path) -> None:
 
     def outputs(start: int, window: int) -> dict[str, Tensor]:
         batch = frames.batch(frames.starts(1)[[start]], window, network.span - 1)
-        return outputs_of(network, batch, normalise(to_float(batch.images)), "cpu")
+        return Lessons(network)(normalise(to_float(batch.images)), batch.index, batch.command)
 
     with torch.no_grad():
         together, alone = outputs(2, 5), outputs(5, 1)

@@ -85,6 +85,7 @@ class Evaluate(EvaluateSettings, Output):
         from caldrive.perception.checkpoint import load_network
         from caldrive.perception.dataset import Frames
         from caldrive.perception.folders import find_episodes, held_out
+        from caldrive.perception.precision import resolve, seeing
         from caldrive.perception.report import PAPER, report
 
         if self.worst is not None:
@@ -94,5 +95,6 @@ class Evaluate(EvaluateSettings, Output):
         if self.held_out:
             episodes = held_out(episodes, info.data)
         frames = Frames(episodes, (network.config.image_height, network.config.image_width))
-        found = report(network, frames, self.worst, lambda share: progress("evaluating", share))
+        see = seeing(network, info, resolve(self.precision, info))
+        found = report(network, frames, see, self.worst, lambda share: progress("evaluating", share))
         return Answer(asdict(found) | {"paper": PAPER}, evaluation_table(found))

@@ -43,7 +43,7 @@ def makings(driver: DriverSettings) -> dict[str, Any]:
     if driver.agent != "cal":
         return {"code": code_version(), "model": None, "precision": None}
     from caldrive.perception.checkpoint import load_network  # with torch, which the oracle does without
-    from caldrive.perception.predictor import resolve
+    from caldrive.perception.precision import resolve
 
     path = model_path(driver.model)
     return {"code": code_version(), "model": _digest(path), "precision": resolve("auto", load_network(path)[1])}

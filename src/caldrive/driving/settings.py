@@ -201,3 +201,5 @@ class EvaluateSettings:
     """Only those episodes that training on this folder kept for validation."""
     worst: Path | None = None
     """A PNG file for the frames that it gets most wrong."""
+    precision: str = "auto"
+    """fp32, bf16 or int8; auto is what it drives in."""

@@ -63,7 +63,7 @@ def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int)
 
 
 class Int8Backbone:
-    """A trained backbone for images of one size, one at a time. ranges: by
+    """A trained backbone for images of one size. ranges: by
     `input_ranges`; threads: how many it may use.
 
     Raises ValueError where the ranges are not this backbone's.
@@ -81,7 +81,7 @@ class Int8Backbone:
         compiled = ov.Core().compile_model(_graph(backbone, ranges, height, width), "CPU", settings)
         self._request = compiled.create_infer_request()
 
-    def __call__(self, image: Tensor) -> Tensor:
-        """A normalised image (1, 3, H, W) to features (1, F)."""
-        found = self._request.infer([image.numpy()], share_inputs=True)
-        return torch.from_numpy(np.array(found[0]))
+    def __call__(self, images: Tensor) -> Tensor:
+        """Normalised images (N, 3, H, W), which pass one at a time, to features (N, F)."""
+        found = [np.array(self._request.infer([image], share_inputs=True)[0]) for image in images.numpy()[:, None]]
+        return torch.from_numpy(np.concatenate(found))

@@ -120,12 +120,6 @@ class Network(nn.Module):
         result: Tensor = self.backbone(images)
         return result
 
-    def on_windows(self, images: Tensor, index: Tensor, command: Tensor) -> dict[str, Tensor]:
-        """Normalised images (N, 3, H, W), and where windows find theirs among them (B, T), to outputs (B * S, K): each
-        image passes the backbone once."""
-        outputs: dict[str, Tensor] = self(self.features(images)[index], command)
-        return outputs
-
     def forward(self, features: Tensor, command: Tensor) -> dict[str, Tensor]:
         """Features (B, T, F) and commands (B,) of the last frame, or (B, S) of the last S frames, to outputs (B * S,
         K)."""

@@ -16,9 +16,9 @@ from torch.optim import Adam
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.dataset import Batch
-from caldrive.perception.evaluation import autocast
 from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.network import Network
+from caldrive.perception.precision import autocast
 from caldrive.perception.repaint import repaint
 from caldrive.perception.sampler import Sampler
 from caldrive.perception.segmentation import STAGE, Segmentation, segmentation_loss
@@ -50,7 +50,8 @@ class Lessons(nn.Module):
         self.network, self.segmentation = network, segmentation
 
     def forward(self, images: Tensor, index: Tensor, command: Tensor) -> dict[str, Tensor]:
-        """As `Network.on_windows`, and under `segmentation` the logits of that lesson."""
+        """Normalised images (N, 3, H, W), and where windows find theirs among them (B, T), to outputs (B * S, K); each
+        image passes the backbone once. Under `segmentation` are the logits of that lesson."""
         maps = self.network.backbone.maps(images)
         outputs: dict[str, Tensor] = self.network(maps[-1].flatten(1)[index], command)
         if self.segmentation is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,9 @@ from torch import Tensor
 
 from caldrive.datatypes import Affordances, Image, Observation
 from caldrive.perception.checkpoint import CheckpointInfo, load_network
-from caldrive.perception.evaluation import use_bf16
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import COMMANDS, Network
+from caldrive.perception.precision import resolve, seeing
 from caldrive.perception.specs import decode
 
 DARK = 3  # no pixel of a working camera's image is as dark as this, even by night
@@ -23,35 +22,10 @@ class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
     """An image tells nothing, or the network makes nothing of it; the driver should brake."""
 
 
-def resolve(precision: str, info: CheckpointInfo) -> str:
-    """fp32, bf16 or int8. `auto` is int8 where the network's ranges are known, else what is faster of the others.
-
-    Raises ValueError for another word, and for int8 without ranges.
-    """
-    if precision == "int8" and not info.ranges:
-        raise ValueError("found a network without the ranges that int8 needs: train it anew, or take fp32")
-    if precision == "int8" or (precision == "auto" and info.ranges):
-        return "int8"
-    return "bf16" if use_bf16(precision, "cpu") else "fp32"
-
-
-def _backbone(network: Network, precision: str, info: CheckpointInfo) -> Callable[[Tensor], Tensor]:
-    """From a normalised image (1, 3, H, W) to features (1, F) in 32 bits."""
-    if precision == "int8":
-        from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which nothing else needs
-
-        config = network.config
-        size = config.image_height, config.image_width
-        return Int8Backbone(network.backbone, info.ranges, *size, torch.get_num_threads())
-    dtype = torch.bfloat16 if precision == "bf16" else torch.float32
-    network.backbone.to(dtype)
-    return lambda image: network.features(image.to(dtype)).float()
-
-
 class NetworkPerception:
     """Perception by a trained network: keeps the features of the last `span` frames of an episode.
 
-    Before the first frame there is the first frame again, as in training. precision: of the backbone, see `precision`.
+    Before the first frame there is the first frame again, as in training. precision: of the backbone, see `resolve`.
     threads: how many it may use, None leaves that as it is. Raises BadImage, and then forgets nothing.
     """
 
@@ -63,7 +37,7 @@ class NetworkPerception:
         else:
             network, info = load_network(network)
         self.network = network.eval()
-        self._features = _backbone(network, resolve(precision, info), info)
+        self._see = seeing(network, info, resolve(precision, info))
         self._history: Tensor | None = None  # (1, span, F)
 
     def reset(self) -> None:
@@ -74,7 +48,7 @@ class NetworkPerception:
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
         self._check(observation.image)
-        feature = self._features(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
+        feature = self._see(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
         if not bool(feature.isfinite().all()):
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:
