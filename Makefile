@@ -7,8 +7,9 @@ ARGS ?=
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 MODEL := out/model
+RESULTS := out/results
 
-.PHONY: drive test lint model clean
+.PHONY: drive test lint model results clean
 drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
@@ -33,6 +34,15 @@ model: $(READY)
 	step evaluate --data $(MODEL)/elsewhere --model $(MODEL)/training/model.safetensors; \
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
+
+# The suites for both agents and their reports in docs/results; a run that was stopped goes on.
+results: $(READY)
+	@for suite in corl2017 nocrash traffic-school; do \
+		for agent in oracle cal; do \
+			$(BIN)/caldrive benchmark --suite $$suite --agent $$agent --out $(RESULTS)/$$suite/$$agent $(ARGS); \
+		done; \
+		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out docs/results/$$suite; \
+	done
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \

@@ -46,6 +46,11 @@ def test_the_lesson_is_given_where_there_are_semantic_images(tmp_path: Path) -> 
     painted = Frames(find_episodes(record(tmp_path / "painted", semantic=True), semantic=True), (HEIGHT, WIDTH))
     run = start(config, TINY, painted, None, Team())
     assert run.lessons.segmentation is not None
+    outputs = run.lessons(torch.randn(2, 3, HEIGHT, WIDTH), torch.tensor([[0], [1]]), torch.zeros(2, 1).long())
+    semantics = np.zeros((2, HEIGHT, WIDTH), np.uint8)
+    segmentation_loss(outputs["segmentation"], semantics, Generator()).backward()  # type: ignore[no-untyped-call]
+    learning = [conv.weight.grad is not None for conv in run.network.backbone.convolutions()]
+    assert learning == [True] * 10 + [False] * 3  # the last stage lies behind the head
     before = run.lessons.segmentation.head.weight.clone()
     run.advance()
     assert not torch.equal(run.lessons.segmentation.head.weight, before)

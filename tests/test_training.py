@@ -86,6 +86,24 @@ def test_what_the_weights_do_not_depend_on_may_change_under_way(folder: Path, tm
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
 
 
+def test_a_network_remembers_what_it_began_with_also_when_it_is_taken_up_without(folder: Path, tmp_path: Path) -> None:
+    first = train(replace(SHORT, steps=1), folder, tmp_path / "first", TINY, progress=False)
+    begun = replace(SHORT, initial=str(first))
+    train(begun, folder, tmp_path / "second", TINY, progress=False, stop=lambda step: step == 4)
+    done = train(SHORT, folder, tmp_path / "second", TINY, progress=False)
+    assert load_network(done)[1].training["initial"] == str(first)
+
+
+def test_a_killed_run_on_semantic_images_resumes_to_the_same_weights(tmp_path: Path) -> None:
+    seen = record(tmp_path / "seen", semantic=True)
+    whole = train(SHORT, seen, tmp_path / "whole", TINY, progress=False)
+    train(SHORT, seen, tmp_path / "killed", TINY, progress=False, stop=lambda step: step == 3)
+    assert train(SHORT, seen, tmp_path / "killed", TINY, progress=False).read_bytes() == whole.read_bytes()
+    train(SHORT, seen, tmp_path / "other", TINY, progress=False, stop=lambda step: step == 2)
+    with pytest.raises(CheckpointError, match="other lessons"):
+        train(SHORT, record(tmp_path / "unseen"), tmp_path / "other", TINY, progress=False)
+
+
 def test_a_state_of_other_settings_is_not_taken_up(folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 2)
     with pytest.raises(CheckpointError, match="other settings"):
@@ -168,4 +186,7 @@ def test_bfloat16_is_used_where_it_is_faster(
 
 
 def test_memory_is_kept_where_the_system_can() -> None:
-    assert keep_memory() is (platform.libc_ver()[0] == "glibc")
+    name, version = platform.libc_ver()
+    if name == "glibc" and tuple(map(int, version.split("."))) < (2, 35):
+        pytest.skip("glibc's malloc kept blocks of 32 MiB at most before 2.35")
+    assert keep_memory() is (name == "glibc")

@@ -110,8 +110,9 @@ class ControlConfig:
 
 @dataclass(frozen=True)
 class CollectConfig:
-    """What to record. duration: s of an episode. cars: in half of the episodes; the others have a third of them.
-    crossing: how much more people cross than usual.
+    """What to record. weathers: by turns, two of five episodes at clear noon, when the shadows are hardest. duration: s
+    of an episode. cars: in half of the episodes; the others have a third of them. crossing: how much more people cross
+    than usual.
 
     Shares of the episodes: before_signs, before_turns begin before a sign, and before a turn at a junction; displaced
     begin beside their lane; rearranged have other houses, trees and colours along the same streets; hidden_cars have a

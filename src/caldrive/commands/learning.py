@@ -57,9 +57,11 @@ class Train(TrainSettings, Output):
         from caldrive.config import PERCEPTIONS, TRAININGS
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.perception.backbone import imagenet_file
+        from caldrive.perception.memory import keep_memory
         from caldrive.perception.training import train
 
         require_writable_folder(self.out)
+        keep_memory()
         if self.preset not in TRAININGS:
             raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
         config = TRAININGS[self.preset]
@@ -85,16 +87,18 @@ class Evaluate(EvaluateSettings, Output):
         from caldrive.perception.checkpoint import load_network
         from caldrive.perception.dataset import Frames
         from caldrive.perception.folders import find_episodes, held_out
-        from caldrive.perception.precision import resolve, seeing
+        from caldrive.perception.precision import driving_precision, features_in
         from caldrive.perception.report import PAPER, report
 
         if self.worst is not None:
             require_writable_file(self.worst, "--worst")
         network, info = load_network(model_path(self.model))
+        precision = driving_precision(self.precision, info)
         episodes = find_episodes(self.data)
         if self.held_out:
             episodes = held_out(episodes, info.data)
         frames = Frames(episodes, (network.config.image_height, network.config.image_width))
-        see = seeing(network, info, resolve(self.precision, info))
-        found = report(network, frames, see, self.worst, lambda share: progress("evaluating", share))
-        return Answer(asdict(found) | {"paper": PAPER}, evaluation_table(found))
+        features = features_in(precision, network, info)
+        found = report(network, frames, features, self.worst, lambda share: progress("evaluating", share))
+        values = asdict(found) | {"paper": PAPER, "precision": precision}
+        return Answer(values, evaluation_table(found, precision))

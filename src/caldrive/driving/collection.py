@@ -138,7 +138,7 @@ def _check(config: CollectConfig, workers: int) -> None:
     if not config.rearranged <= 1:
         raise ValueError(f"found --rearranged {config.rearranged:g}, wanted at most 1: type --rearranged 1")
     if not config.weathers:
-        raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 3 6 8")
+        raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 3 1 6 8")
     for number in config.weathers:
         weather(number)
     load_town(config.town)

@@ -43,10 +43,11 @@ def makings(driver: DriverSettings) -> dict[str, Any]:
     if driver.agent != "cal":
         return {"code": code_version(), "model": None, "precision": None}
     from caldrive.perception.checkpoint import load_network  # with torch, which the oracle does without
-    from caldrive.perception.precision import resolve
+    from caldrive.perception.precision import driving_precision
 
     path = model_path(driver.model)
-    return {"code": code_version(), "model": _digest(path), "precision": resolve("auto", load_network(path)[1])}
+    precision = driving_precision("auto", load_network(path)[1])
+    return {"code": code_version(), "model": _digest(path), "precision": precision}
 
 
 def _machine() -> str:

@@ -53,12 +53,12 @@ def _scaled(metric: str, figures: Mapping[str, float]) -> str:
     return f"{figures[metric] / SCALES[metric]:.3g}" if metric.endswith("/mae") else ""
 
 
-def evaluation_table(found: Report) -> Group:
+def evaluation_table(found: Report, precision: str) -> Group:
     """Mean IoU and MAE over all frames, as the paper has them, and by command, weather and town; confusions."""
     paper = {name: _papers(name) for name, _ in FIGURES.values()}
     table = Table("", *FIGURES, box=SIMPLE_HEAD)
     rows = {
-        f"all {found.frames} frames": found.overall,
+        f"all {found.frames} frames, in {precision}": found.overall,
         "the paper, in CARLA": paper,
     }
     rows |= {f"{kind} {value}": figures for kind, values in found.groups.items() for value, figures in values.items()}

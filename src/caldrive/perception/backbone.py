@@ -74,7 +74,7 @@ class Backbone(nn.Module):
         return self.maps(images)[-1].flatten(1)
 
     def maps(self, images: Tensor) -> list[Tensor]:
-        """What each of the five stages makes of images (N, 3, H, W): the k-th (N, C, H // 2**k, W // 2**k)."""
+        """What each of the five stages makes of images (N, 3, H, W): the first one (N, C, H // 2, W // 2)."""
         x, found = images, []
         for stage, norm in zip(self.stages, self.norms, strict=True):
             assert isinstance(stage, nn.ModuleList)

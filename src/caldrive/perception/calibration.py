@@ -15,6 +15,7 @@ from caldrive.perception.network import Network
 from caldrive.perception.specs import ClassWeights
 
 KEPT = 0.9999  # share of the values that a range holds; the few beyond it are clipped
+AT_ONCE = 16  # images
 
 
 def calibrated(
@@ -38,17 +39,20 @@ def calibrated(
 
 @torch.no_grad()
 def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
-    """For each convolution the largest size of what enters it, from normalised images (N, 3, H, W)."""
-    found: list[float] = []
+    """For each convolution the size that all but one in ten thousand of the values that enter it stay below, as
+    normalised images (N, 3, H, W) pass."""
+    found: list[list[float]] = []
 
     def note(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
         sizes = inputs[0].abs().float().flatten()
-        found.append(float(sizes.kthvalue(max(1, round(KEPT * len(sizes)))).values))
+        found[-1].append(float(sizes.kthvalue(max(1, round(KEPT * len(sizes)))).values))
 
     hooks = [conv.register_forward_pre_hook(note) for conv in backbone.convolutions()]
     try:
-        backbone(images)
+        for part in torch.split(images, AT_ONCE):
+            found.append([])
+            backbone(part)
     finally:
         for hook in hooks:
             hook.remove()
-    return tuple(found)
+    return tuple(map(max, zip(*found, strict=True)))

@@ -30,7 +30,9 @@ class CheckpointError(ValueError):
 @dataclass(frozen=True)
 class CheckpointInfo:
     """What is known of a trained network: its configuration, its data, its validation metrics, how it was trained, and
-    the range of what enters each of its convolutions (empty where nobody looked)."""
+    the range of what enters each of its convolutions (empty where nobody looked).
+
+    The metrics are those in the precision of the training, not in the 8 bits in which it may drive."""
 
     config: PerceptionConfig
     data: dict[str, Any] = field(default_factory=dict)

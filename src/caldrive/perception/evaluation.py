@@ -11,7 +11,7 @@ from torch import Tensor
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
-from caldrive.perception.precision import See, autocast
+from caldrive.perception.precision import Features, autocast
 from caldrive.perception.sampler import every_window
 from caldrive.perception.specs import Outputs, Targets, losses, metrics
 
@@ -25,15 +25,15 @@ def unwatched(share: float) -> None:
 
 @torch.no_grad()
 def outputs_on(
-    network: Network, frames: Frames, see: See, device: str = "cpu", progress: Done = unwatched
+    network: Network, frames: Frames, features: Features, device: str = "cpu", progress: Done = unwatched
 ) -> tuple[Ids, Outputs, Targets]:
-    """Numbers (N,) of all frames, outputs (N, K) and targets (N,) on them. see: the backbone."""
+    """Numbers (N,) of all frames, outputs (N, K) and targets (N,) on them. features: the network's backbone."""
     network.eval()
     ids, outputs, targets = [], [], []
     for starts in every_window(frames, 1, BATCH):
         batch = frames.batch(starts, 1, network.span - 1)
-        features = see(normalise(to_float(batch.images)).to(device)).float()
-        outputs.append(network(features[batch.index.to(device)], batch.command.to(device)))
+        seen = features(normalise(to_float(batch.images)).to(device)).float()
+        outputs.append(network(seen[batch.index.to(device)], batch.command.to(device)))
         ids.append(starts)
         targets.append(batch.targets)
         progress(float(starts[-1]) / len(frames))
@@ -44,10 +44,10 @@ def outputs_on(
 def evaluate(network: Network, frames: Frames, precision: str = "auto", device: str = "cpu") -> dict[str, float]:
     """Metrics over all frames, and each affordance's unweighted loss as `<name>/loss`, their sum as `loss`."""
 
-    def see(images: Tensor) -> Tensor:
+    def features(images: Tensor) -> Tensor:
         with autocast(precision, device):
             return network.features(images)
 
-    _, outputs, targets = outputs_on(network, frames, see, device)
+    _, outputs, targets = outputs_on(network, frames, features, device)
     parts = {f"{name}/loss": float(value) for name, value in losses(outputs, targets).items()}
     return {"loss": sum(parts.values())} | parts | metrics(outputs, targets)

@@ -4,7 +4,7 @@ to the same weights."""
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -133,7 +133,13 @@ class Run:
                 f"{path} belongs to a run with other settings: give another folder or remove this one"
             )
         known = {k.removeprefix("lessons."): v for k, v in tensors.items() if k.startswith("lessons.")}
+        if known.keys() != self.lessons.state_dict().keys():
+            raise CheckpointError(
+                f"{path} belongs to a run with other lessons, as on a recording with or without semantic images: "
+                "give the same --data or another --out"
+            )
         self.lessons.load_state_dict(known)
+        self.config = replace(self.config, initial=header["training"]["initial"])
         states: dict[int, dict[str, Tensor]] = {}
         for name, value in tensors.items():
             if name.startswith("optimizer."):

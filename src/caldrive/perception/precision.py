@@ -12,7 +12,8 @@ from torch import Tensor
 from caldrive.perception.checkpoint import CheckpointInfo
 from caldrive.perception.network import Network
 
-See = Callable[[Tensor], Tensor]  # normalised images (N, 3, H, W) to features (N, F)
+Features = Callable[[Tensor], Tensor]  # a backbone: normalised images (N, 3, H, W) to features (N, F)
+PRECISIONS = ("auto", "fp32", "bf16", "int8")
 
 
 def _bf16_pays() -> bool:
@@ -22,10 +23,16 @@ def _bf16_pays() -> bool:
     return bool(able.get("amx_bf16") or (able.get("avx512_bf16") and "Intel" not in able.get("cpu_name", "")))
 
 
+def _int8_pays() -> bool:
+    """Whether this processor adds products of bytes in 32 bits; older ones do it in 16, slower and not always right."""
+    able = torch.cpu.get_capabilities()
+    return any(able.get(name) for name in ("avx512_vnni", "avx_vnni", "amx_int8"))
+
+
 def use_bf16(precision: str, device: str) -> bool:
     """Whether to compute in bfloat16; `auto` does where that is faster than fp32."""
     if precision not in ("auto", "fp32", "bf16"):
-        raise ValueError(f"precision is {precision!r}, but must be auto, fp32 or bf16 (int8 only drives)")
+        raise ValueError(f"precision is {precision!r}, but must be auto, fp32 or bf16 (int8 is for driving)")
     if precision != "auto":
         return precision == "bf16"
     return device != "cpu" or _bf16_pays()
@@ -36,20 +43,23 @@ def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
     return torch.autocast(device.split(":")[0], torch.bfloat16) if use_bf16(precision, device) else nullcontext()
 
 
-def resolve(precision: str, info: CheckpointInfo) -> str:
-    """fp32, bf16 or int8. `auto` is int8 where the network's ranges are known, else what is faster of the others.
+def driving_precision(wanted: str, info: CheckpointInfo) -> str:
+    """fp32, bf16 or int8. `auto` is int8 where the network's ranges are known and the processor has VNNI, else what is
+    faster of the others.
 
     Raises ValueError for another word, and for int8 without ranges.
     """
-    if precision == "int8" and not info.ranges:
+    if wanted not in PRECISIONS:
+        raise ValueError(f"found precision {wanted!r}, wanted one of {', '.join(PRECISIONS)}: type --precision auto")
+    if wanted == "int8" and not info.ranges:
         raise ValueError("found a network without the ranges that int8 needs: train it anew, or take fp32")
-    if precision == "int8" or (precision == "auto" and info.ranges):
+    if wanted == "int8" or (wanted == "auto" and info.ranges and _int8_pays()):
         return "int8"
-    return "bf16" if use_bf16(precision, "cpu") else "fp32"
+    return "bf16" if use_bf16(wanted, "cpu") else "fp32"
 
 
-def seeing(network: Network, info: CheckpointInfo, precision: str) -> See:
-    """The backbone in fp32, bf16 or int8 on the CPU."""
+def features_in(precision: str, network: Network, info: CheckpointInfo) -> Features:
+    """The backbone in fp32, bf16 or int8 on the CPU; bf16 turns the network's own."""
     if precision == "int8":
         from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which nothing else needs
 

@@ -12,7 +12,7 @@ from caldrive.datatypes import Affordances, Image, Observation
 from caldrive.perception.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import COMMANDS, Network
-from caldrive.perception.precision import resolve, seeing
+from caldrive.perception.precision import driving_precision, features_in
 from caldrive.perception.specs import decode
 
 DARK = 3  # no pixel of a working camera's image is as dark as this, even by night
@@ -25,8 +25,9 @@ class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
 class NetworkPerception:
     """Perception by a trained network: keeps the features of the last `span` frames of an episode.
 
-    Before the first frame there is the first frame again, as in training. precision: of the backbone, see `resolve`.
-    threads: how many it may use, None leaves that as it is. Raises BadImage, and then forgets nothing.
+    Before the first frame there is the first frame again, as in training. precision: of the backbone,
+    see `driving_precision`; a network that is no file has no ranges. threads: how many it may use, None leaves that as
+    it is. Raises BadImage, and then forgets nothing.
     """
 
     def __init__(self, network: Network | Path | str, precision: str = "auto", threads: int | None = None) -> None:
@@ -37,7 +38,7 @@ class NetworkPerception:
         else:
             network, info = load_network(network)
         self.network = network.eval()
-        self._see = seeing(network, info, resolve(precision, info))
+        self._features = features_in(driving_precision(precision, info), network, info)
         self._history: Tensor | None = None  # (1, span, F)
 
     def reset(self) -> None:
@@ -48,7 +49,7 @@ class NetworkPerception:
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
         self._check(observation.image)
-        feature = self._see(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
+        feature = self._features(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
         if not bool(feature.isfinite().all()):
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:

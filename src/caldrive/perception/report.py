@@ -14,7 +14,7 @@ from caldrive.files import write_figure
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.evaluation import Done, outputs_on, unwatched
 from caldrive.perception.network import COMMANDS, Network
-from caldrive.perception.precision import See
+from caldrive.perception.precision import Features
 from caldrive.perception.specs import SPECS, Outputs, Spec, Targets, confusion, metrics
 
 # Supplement, comparison of temporal and non-temporal task blocks: the better of the two.
@@ -47,10 +47,10 @@ def _part(of: Outputs | Targets, rows: NDArray[np.bool_]) -> dict[str, torch.Ten
 
 
 def report(
-    network: Network, frames: Frames, see: See, picture: Path | None = None, progress: Done = unwatched
+    network: Network, frames: Frames, features: Features, picture: Path | None = None, progress: Done = unwatched
 ) -> Report:
-    """Runs the network over all frames. see: its backbone; picture: where to draw the worst ones (PNG)."""
-    ids, outputs, targets = outputs_on(network, frames, see, progress=progress)
+    """Runs the network over all frames. features: its backbone; picture: where to draw the worst ones (PNG)."""
+    ids, outputs, targets = outputs_on(network, frames, features, progress=progress)
     kinds: dict[str, NDArray[Any]] = {
         "command": np.array([command.value for command in COMMANDS])[frames.command[ids]],
         "weather": frames.weather[ids].astype(str),

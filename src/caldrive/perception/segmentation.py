@@ -14,7 +14,7 @@ from torch.nn.functional import cross_entropy, pixel_shuffle
 
 from caldrive.perception.repaint import FREEDOM
 
-STAGE = 3  # of the backbone: its cells of 16 pixels see 100 pixels around, and each answers for four of 8 pixels
+STAGE = 3  # of the backbone, counted from 0: a cell of 16 pixels answers for four of 8, and sees 100 x 100 pixels
 CELL = 8
 
 

@@ -22,7 +22,6 @@ from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, Run, learning_rate
 from caldrive.perception.sampler import Sampler, summary
@@ -102,7 +101,6 @@ def train(
     torchrun the processes share each batch out, and the first one writes.
     """
     out, perception = Path(out), perception or PerceptionConfig()
-    keep_memory()
     team = join(config.device, config.batch)
     size = (perception.image_height, perception.image_width)
     train_episodes, held_episodes = split(
