@@ -8,6 +8,7 @@ import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,24 @@ def test_frames_inside_a_junction_are_marked(tmp_path: Path) -> None:
 
 def test_the_cameras_see_different_pictures_that_change(episode: Episode) -> None:
     assert len(set(episode.jpegs)) > 50
+
+
+def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
+    truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0)
+    world = SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
+    told = []
+    for index, _, telling in collection._moments(world, replace(TINY, duration=5.0)):  # type: ignore[arg-type]
+        world.observation.speed = 5.0 if index >= 60 else 0.0
+        told += [index] if telling else []
+    standing = [index for index in told if index <= 60]
+    assert standing == [*range(15), 29, 44, 59]
+    assert told[len(standing) :] == list(range(61, 61 + 50 - len(standing)))  # five seconds that tell something
+
+
+def test_an_episode_in_which_the_car_stands_on_ends() -> None:
+    truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0)
+    world = SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
+    assert len(list(collection._moments(world, replace(TINY, duration=5.0)))) == 100  # type: ignore[arg-type]
 
 
 def test_weathers_take_turns(unbroken: Path) -> None:

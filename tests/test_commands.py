@@ -193,7 +193,7 @@ def test_what_is_collected_can_be_trained_on_and_the_result_drives(
 ) -> None:
     import caldrive.config
 
-    small = caldrive.config.TrainingConfig(steps=2, batch=2, window=3, save_every=1)
+    small = caldrive.config.TrainingConfig(steps=2, batch=2, window=3, block_steps=3, block_batch=8, save_every=1)
     monkeypatch.setitem(caldrive.config.TRAININGS, "small", small)
     recording, training = tmp_path / "recording", tmp_path / "training"
     found = run_json(

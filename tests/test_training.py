@@ -24,8 +24,10 @@ from caldrive.perception.training import train
 from tests.perception_data import HEIGHT, TINY, WIDTH, record
 
 SHORT = TrainingConfig(
-    steps=6, batch=4, window=3, warm_up=2, evaluate_every=100, save_every=2, precision="fp32", validation_share=0.3
-)
+    steps=6, batch=4, window=3, warm_up=2, block_steps=0, evaluate_every=100, save_every=2, precision="fp32",
+    validation_share=0.3,
+)  # fmt: skip
+BLOCKS = replace(SHORT, block_steps=5, block_batch=8)
 
 
 @pytest.fixture(scope="module", autouse=True)

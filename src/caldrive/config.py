@@ -111,7 +111,8 @@ class ControlConfig:
 @dataclass(frozen=True)
 class CollectConfig:
     """What to record. weathers: by turns, two of five episodes at clear noon, when the shadows are hardest. duration: s
-    of an episode. cars: in half of the episodes; the others have a third of them. crossing: how much more people cross
+    of an episode, which is short, as every place and look tells most at first; of the time in which the car stands only
+    a part counts. cars: in half of the episodes; the others have a third of them. crossing: how much more people cross
     than usual.
 
     Shares of the episodes: before_signs, before_turns begin before a sign, and before a turn at a junction; displaced
@@ -121,14 +122,14 @@ class CollectConfig:
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 3, 1, 6, 8)
-    episodes: int = 400
-    duration: float = 30.0
+    episodes: int = 1400
+    duration: float = 12.0
     cars: int = 75
     people: int = 70
-    crossing: float = 3.0
-    before_signs: float = 0.4
-    before_turns: float = 0.4
-    displaced: float = 0.25
+    crossing: float = 5.0
+    before_signs: float = 0.35
+    before_turns: float = 0.5
+    displaced: float = 0.3
     rearranged: float = 0.85
     hidden_cars: float = 0.1
     width: int = 200
@@ -167,12 +168,12 @@ class PerceptionConfig:
     image_height: int = 88
     width: float = 0.25
     batch_norm: bool = True
-    hazard_stop: BlockConfig = BlockConfig("dense", 64, 0.25)
+    hazard_stop: BlockConfig = BlockConfig("tconv", 64, 0.25, length=5, dilation=2)
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
     vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
-    relative_angle: BlockConfig = BlockConfig("dense", 64, 0.0, norm=False)
-    center_distance: BlockConfig = BlockConfig("dense", 64, 0.0, norm=False)
+    relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
+    center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
 
 
 PERCEPTIONS = {
@@ -199,6 +200,9 @@ class TrainingConfig:
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
     segmentation: weight of the second lesson's loss, where the recording has semantic images; 0 leaves it out.
+    block_steps: after the others, steps in which the task blocks learn alone, from block_batch frames each with their
+    history, which the finished backbone saw once; until then each frame is seen as a stream's first one. 0: the blocks
+    see their history from the first step on.
     balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu, cuda, or
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
@@ -214,6 +218,8 @@ class TrainingConfig:
     balance: float = 0.5
     augment: bool = True
     segmentation: float = 0.5
+    block_steps: int = 3_000
+    block_batch: int = 256
     validation_share: float = 0.05
     evaluate_every: int = 1000
     save_every: int = 100
@@ -227,5 +233,7 @@ class TrainingConfig:
 TRAININGS = {
     "small": TrainingConfig(),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
-    "paper": TrainingConfig(steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0),
+    "paper": TrainingConfig(
+        steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0, block_steps=0
+    ),
 }

@@ -34,6 +34,8 @@ BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
 ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
+PATIENCE = 2  # times an episode's duration
+STANDING, STOOD = 0.1, 15  # m/s; of moments in which the car stands the first ones are recorded, then one in as many
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
 
 
@@ -62,9 +64,12 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
     ]
     disturbance, frames = Disturbance(rng), 0
     with EpisodeWriter(episode_path(folder, number), scenario) as writer:
-        for index, observation in enumerate(_moments(world, config)):
+        for index, observation, telling in _moments(world, config):
             clean = agent.act(observation)
             driven = disturbance.apply(clean, observation.speed)
+            if not telling:
+                world.step(driven)
+                continue
             inside = world.route.inside_junction(world.progress)
             semantics = world.semantic_images(mounts) if config.semantic else [None] * len(mounts)
             seen = zip(mounts, world.images(mounts), semantics, strict=True)
@@ -105,12 +110,17 @@ def _set_up(
     return scenario, agent
 
 
-def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[Observation]:
-    """Observations until time is up, the route ends or the car touches something."""
-    for _ in range(round(config.duration / world.dt)):
-        yield world.observation
+def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[tuple[int, Observation, bool]]:
+    """Moments by number, and whether each tells something new, until enough of them did, patience or the route ends, or
+    the car touches something."""
+    wanted, told, stood = round(config.duration / world.dt), 0, 0
+    for index in range(PATIENCE * wanted):
+        stood = stood + 1 if world.observation.speed < STANDING else 0
+        telling = stood <= STOOD or stood % STOOD == 0
+        told += telling
+        yield index, world.observation, telling
         truth = world.truth()
-        if truth.contacts or truth.route_done >= truth.route_length - 5:
+        if told == wanted or truth.contacts or truth.route_done >= truth.route_length - 5:
             return
 
 

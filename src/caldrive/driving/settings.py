@@ -138,7 +138,7 @@ class CollectSettings:
     episodes: int = CollectConfig.episodes
     """How many episodes the folder holds in the end."""
     duration: float = CollectConfig.duration
-    """Simulated seconds of each."""
+    """Simulated seconds of each; of those in which the car stands for long one in fifteen counts."""
     cars: int = CollectConfig.cars
     """Other cars."""
     people: int = CollectConfig.people

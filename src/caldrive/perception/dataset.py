@@ -117,14 +117,16 @@ class Frames:
         chosen = (self._where[i] for i in ids.tolist())
         return np.stack(list(self._pool.map(lambda where: where[0].semantic(where[1], self.size), chosen)))
 
+    def windows(self, starts: Ids, window: int, context: int) -> Ids:
+        """Frames (B, context + window) of the windows whose first frames with a loss are `starts`; before a stream's
+        first frame, history is that frame again."""
+        ids: Ids = np.maximum(starts[:, None] + np.arange(-context, window), self.stream_start[starts][:, None])
+        return ids
+
     def batch(self, starts: Ids, window: int, context: int) -> Batch:
         """The windows whose first frames with a loss are `starts`; all of them must lie `window` frames before their
-        stream's end.
-
-        Before a stream's first frame, history is that frame again.
-        """
-        ids = starts[:, None] + np.arange(-context, window)
-        ids = np.maximum(ids, self.stream_start[starts][:, None])  # (B, T)
+        stream's end."""
+        ids = self.windows(starts, window, context)
         unique, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
         trained = ids[:, context:]  # (B, S)
         return Batch(

@@ -25,13 +25,20 @@ def unwatched(share: float) -> None:
 
 @torch.no_grad()
 def outputs_on(
-    network: Network, frames: Frames, features: Features, device: str = "cpu", progress: Done = unwatched
+    network: Network,
+    frames: Frames,
+    features: Features,
+    device: str = "cpu",
+    progress: Done = unwatched,
+    context: int | None = None,
 ) -> tuple[Ids, Outputs, Targets]:
-    """Numbers (N,) of all frames, outputs (N, K) and targets (N,) on them. features: the network's backbone."""
+    """Numbers (N,) of all frames, outputs (N, K) and targets (N,) on them. features: the network's backbone; context:
+    frames of history that it sees, without it as many as its blocks look at."""
     network.eval()
+    context = network.span - 1 if context is None else context
     ids, outputs, targets = [], [], []
     for starts in every_window(frames, 1, BATCH):
-        batch = frames.batch(starts, 1, network.span - 1)
+        batch = frames.batch(starts, 1, context)
         seen = features(normalise(to_float(batch.images)).to(device)).float()
         outputs.append(network(seen[batch.index.to(device)], batch.command.to(device)))
         ids.append(starts)
@@ -41,13 +48,15 @@ def outputs_on(
     return np.concatenate(ids), joined, {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
 
 
-def evaluate(network: Network, frames: Frames, precision: str = "auto", device: str = "cpu") -> dict[str, float]:
+def evaluate(
+    network: Network, frames: Frames, precision: str = "auto", device: str = "cpu", context: int | None = None
+) -> dict[str, float]:
     """Metrics over all frames, and each affordance's unweighted loss as `<name>/loss`, their sum as `loss`."""
 
     def features(images: Tensor) -> Tensor:
         with autocast(precision, device):
             return network.features(images)
 
-    _, outputs, targets = outputs_on(network, frames, features, device)
+    _, outputs, targets = outputs_on(network, frames, features, device, context=context)
     parts = {f"{name}/loss": float(value) for name, value in losses(outputs, targets).items()}
     return {"loss": sum(parts.values())} | parts | metrics(outputs, targets)

@@ -81,6 +81,11 @@ class Run:
     def network(self) -> Network:
         return self.lessons.network
 
+    @property
+    def context(self) -> int:
+        """Frames of history that a window brings along."""
+        return 0 if self.config.block_steps else self.network.span - 1
+
     def advance(self) -> float:
         """One step; returns its loss, where there are several processes that of this one's share of the batch."""
         config, team = self.config, self.team
@@ -88,7 +93,7 @@ class Run:
         generator = torch.Generator().manual_seed(seed)
         torch.manual_seed(seed)  # dropout
         starts = self.sampler.draw(self.step, config.batch)[team.rank :: team.size]
-        batch = self.sampler.frames.batch(starts, config.window, self.network.span - 1)
+        batch = self.sampler.frames.batch(starts, config.window, self.context)
         images = normalise(self._augmented(batch, generator))
         targets = {name: target.to(team.device) for name, target in batch.targets.items()}
         for group in self.optimizer.param_groups:

@@ -15,6 +15,7 @@ from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
+from caldrive.perception.blocks import feature_table, forget_features, learn_blocks
 from caldrive.perception.calibration import calibrated, input_ranges
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
 from caldrive.perception.curves import Board, draw_curves
@@ -71,12 +72,15 @@ def start(
     return Run(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
 
 
-def validate(run: Run, held: Frames, model: Path) -> Row:
-    """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`."""
+def validate(run: Run, held: Frames, model: Path, context: int) -> Row:
+    """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`.
+
+    context: frames of history that it sees.
+    """
     sampler, config = run.sampler, run.config
     network = calibrated(run.network, sampler.frames, sampler.class_counts(), run.weights).eval()
     round_to_half(network)
-    found = evaluate(network, held, config.precision, run.team.device)
+    found = evaluate(network, held, config.precision, run.team.device, context)
     seen = normalise(to_float(sampler.frames.images(sampler.draw(0, RANGED))))
     ranges = input_ranges(network.backbone, seen.to(run.team.device))
     info = CheckpointInfo(network.config, summary(sampler.frames, held), found, asdict(config), config.seed, ranges)
@@ -96,7 +100,8 @@ def train(
     """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
 
     In `out` lie also state.safetensors, from which the same call resumes, and metrics.jsonl: a row a step with its
-    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them, and where
+    loss, and validation metrics every `evaluate_every` steps and at the end; `features` holds what the finished
+    backbone makes of the frames while the blocks learn; curves.png draws them, and where
     TensorBoard is installed it finds them in `out`/tensorboard. `stop` may end the run early after a step. Under
     torchrun the processes share each batch out, and the first one writes.
     """
@@ -120,7 +125,29 @@ def train(
             rows.append(_step(run, held, out, rows))
             board.add(rows[-1])
             bar.update(task, completed=run.step, note=f"loss {rows[-1]['loss']:.3f}")
+        if run.step == config.steps and config.block_steps and team.leads and not stop(run.step):
+            _finish(run, held, out, rows, board, bar)
     return out / MODEL
+
+
+def _finish(run: Run, held: Frames, out: Path, rows: list[Row], board: Board, bar: Progress) -> None:
+    """The blocks learn alone, unless they did already."""
+    last = run.config.steps + run.config.block_steps
+    if kept_rows(out / METRICS, last)[-1]["step"] == last:
+        return
+    task = bar.add_task("features", total=len(run.sampler.frames), note="features")
+    info = load_network(out / MODEL)[1]
+    features = feature_table(run, info, out, lambda n: bar.update(task, completed=n))
+    task = bar.add_task("blocks", total=run.config.block_steps, note="")
+    for step, loss in enumerate(learn_blocks(run, features), start=1):
+        rows.append({"step": run.config.steps + step, "loss": loss})
+        bar.update(task, completed=step, note=f"blocks' loss {loss:.3f}")
+    run.network.to(run.team.device)
+    rows[-1] |= validate(run, held, out / MODEL, run.network.span - 1)
+    draw_curves(rows, out / CURVES)
+    board.add(rows[-1])
+    write_whole(out / METRICS, "".join(json.dumps(row) + "\n" for row in rows).encode())
+    forget_features(out)
 
 
 def _step(run: Run, held: Frames, out: Path, rows: list[Row]) -> Row:
@@ -131,7 +158,7 @@ def _step(run: Run, held: Frames, out: Path, rows: list[Row]) -> Row:
     last = run.step == config.steps
     if last or run.step % config.evaluate_every == 0:
         if run.team.leads:
-            row |= validate(run, held, out / MODEL)
+            row |= validate(run, held, out / MODEL, run.context)
             draw_curves([*rows, row], out / CURVES)
         run.team.wait()
     if run.team.leads and (last or run.step % config.save_every == 0):

@@ -1,0 +1,106 @@
+"""The last part of a training: the task blocks learn alone, from what the finished backbone makes of the frames.
+
+A frame with its history costs the backbone as many passes as the history has frames. A finished backbone passes each
+frame of the recording once, in the precision in which it drives; after that a step of the blocks, with history, takes
+a hundredth of the time of a step with images.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.optim import Adam
+
+from caldrive.perception.backbone import Backbone
+from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, read_tensors, round_to_half, write_tensors
+from caldrive.perception.dataset import Frames, Ids
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network import Network
+from caldrive.perception.optimisation import Run, learning_rate
+from caldrive.perception.precision import Features, driving_precision, features_in
+from caldrive.perception.specs import loss
+
+FOLDER, CHUNK, BATCH = "features", 8192, 64  # frames in a file, and at once
+
+
+def _digest(backbone: Backbone) -> str:
+    found = hashlib.sha256()
+    for value in backbone.state_dict().values():
+        found.update(value.detach().cpu().numpy().tobytes())
+    return found.hexdigest()[:16]
+
+
+@torch.inference_mode()
+def _see(frames: Frames, ids: Ids, features: Features) -> Tensor:
+    """Features (N, F) of frames by number, in 16 bits."""
+    parts = np.array_split(ids, max(1, len(ids) // BATCH))
+    return torch.cat([features(normalise(to_float(frames.images(part)))).half() for part in parts])
+
+
+def _kept(path: Path, digest: str) -> Tensor | None:
+    """The features in a file, where they are those of this backbone."""
+    try:
+        tensors, header = read_tensors(path)
+    except CheckpointError:
+        return None
+    return tensors["features"] if header.get("backbone") == digest else None
+
+
+def feature_table(run: Run, info: CheckpointInfo, out: Path, done: Callable[[int], None]) -> Tensor:
+    """What the backbone, rounded as it is stored, makes of every frame (N, F); kept in `out`, so that it goes on after
+    a kill. info: of the network as it is stored; done: told how many frames are seen."""
+    network, frames = run.network.cpu().eval(), run.sampler.frames
+    round_to_half(network)
+    digest, parts = _digest(network.backbone), []
+    features = features_in(driving_precision("auto", info), network, info)
+    for number, first in enumerate(range(0, len(frames), CHUNK)):
+        path = out / FOLDER / f"{number:04d}.safetensors"
+        part = _kept(path, digest)
+        if part is None:
+            part = _see(frames, np.arange(first, min(first + CHUNK, len(frames))), features)
+            write_tensors(path, {"features": part}, {"kind": "features", "backbone": digest})
+        parts.append(part)
+        done(first + len(part))
+    return torch.cat(parts)
+
+
+def forget_features(out: Path) -> None:
+    """Frees the disk of what `feature_table` kept."""
+    shutil.rmtree(out / FOLDER, ignore_errors=True)
+
+
+def learn_blocks(run: Run, features: Tensor) -> Iterator[float]:
+    """Trains the blocks of the run's network on features (N, F) of all its frames; yields each step's loss."""
+    network, frames = run.network, run.sampler.frames
+    config = replace(run.config, steps=run.config.block_steps)
+    weights = {name: weight.cpu() for name, weight in run.weights.items()}
+    optimizer = Adam(network.blocks.parameters(), config.learning_rate)
+    network.blocks.train()
+    for step in range(config.block_steps):
+        torch.manual_seed(config.seed * 1_000_003 + config.steps + step)  # dropout
+        starts = run.sampler.draw(run.config.steps + step, config.block_batch)
+        for group in optimizer.param_groups:
+            group["lr"] = learning_rate(step, config)
+        total = loss(*_lesson(network, frames, features, starts, config.window), weights)
+        optimizer.zero_grad(set_to_none=True)
+        total.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(network.blocks.parameters(), config.clip)
+        optimizer.step()
+        yield float(total.detach())
+
+
+def _lesson(
+    network: Network, frames: Frames, features: Tensor, starts: Ids, window: int
+) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    """Outputs and targets of the windows that begin with these frames."""
+    ids = frames.windows(starts, window, network.span - 1)
+    trained = ids[:, -window:]
+    outputs = network(features[torch.from_numpy(ids)].float(), torch.from_numpy(frames.command[trained]))
+    return outputs, {name: target[trained.ravel()] for name, target in frames.targets.items()}

@@ -1,0 +1,107 @@
+"""The blocks' own lesson: on features of a finished backbone, with history, and broken off anywhere."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from caldrive.perception import blocks
+from caldrive.perception.checkpoint import load_network, write_tensors
+from caldrive.perception.dataset import Frames
+from caldrive.perception.evaluation import evaluate
+from caldrive.perception.folders import find_episodes, split
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.precision import features_in
+from caldrive.perception.training import train
+from tests.perception_data import HEIGHT, TINY, WIDTH, record
+from tests.test_training import BLOCKS, SHORT
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    torch.set_num_threads(1)
+    return record(tmp_path_factory.mktemp("episodes"))
+
+
+def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path: Path) -> None:
+    long = replace(BLOCKS, block_steps=60, learning_rate=3e-3, augment=False)
+    before = load_network(train(replace(long, block_steps=0), folder, tmp_path / "before", TINY, progress=False))[0]
+    after, info = load_network(train(long, folder, tmp_path / "after", TINY, progress=False))
+    rows = [json.loads(line) for line in (tmp_path / "after" / "metrics.jsonl").open()]
+    assert [row["step"] for row in rows] == list(range(1, 67))
+    assert np.mean([row["loss"] for row in rows[-10:]]) < 0.8 * np.mean([row["loss"] for row in rows[6:16]])
+    assert rows[-1]["validation/loss"] == info.metrics["loss"]
+    assert before.config == after.config
+    assert not (tmp_path / "after" / "features").exists()
+
+
+def test_only_the_blocks_change(folder: Path, tmp_path: Path) -> None:
+    first = train(BLOCKS, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 6)
+    before = load_network(first)[0].state_dict()
+    after = load_network(train(BLOCKS, folder, tmp_path, TINY, progress=False))[0].state_dict()
+    changed = {name for name in before if not torch.equal(before[name], after[name])}
+    assert changed
+    assert all(name.startswith("blocks.") for name in changed)
+
+
+def test_until_the_blocks_learn_alone_they_see_no_history(folder: Path, tmp_path: Path) -> None:
+    model = train(BLOCKS, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 6)
+    network, info = load_network(model)
+    held = Frames(split(find_episodes(folder), BLOCKS.validation_share, BLOCKS.seed)[1], (HEIGHT, WIDTH))
+    assert evaluate(network, held, "fp32", context=0) == info.metrics
+    assert evaluate(network, held, "fp32") != info.metrics
+    network, info = load_network(train(BLOCKS, folder, tmp_path, TINY, progress=False))
+    assert evaluate(network, held, "fp32") == info.metrics
+
+
+@pytest.mark.parametrize("place", ["_see", "_lesson"])
+def test_a_run_killed_while_the_blocks_learn_resumes_to_the_same_network(
+    place: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = train(BLOCKS, folder, tmp_path / "whole", TINY, progress=False)
+    monkeypatch.setattr(blocks, "CHUNK", 50)
+    right, calls = getattr(blocks, place), []
+
+    def killed(*arguments: Any) -> Any:
+        calls.append(None)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return right(*arguments)
+
+    monkeypatch.setattr(blocks, place, killed)
+    with pytest.raises(KeyboardInterrupt):
+        train(BLOCKS, folder, tmp_path / "killed", TINY, progress=False)
+    assert list((tmp_path / "killed" / "features").iterdir())
+    resumed = train(BLOCKS, folder, tmp_path / "killed", TINY, progress=False)
+    assert resumed.read_bytes() == whole.read_bytes()
+    assert len(calls) == {"_see": 5, "_lesson": 8}[place]  # 160 frames in chunks of 50; what was seen is kept
+
+
+def test_a_finished_run_stays_as_it_is(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = train(BLOCKS, folder, tmp_path, TINY, progress=False).read_bytes()
+    monkeypatch.setattr(blocks, "_see", None)
+    assert train(BLOCKS, folder, tmp_path, TINY, progress=False).read_bytes() == before
+
+
+def test_features_of_another_backbone_are_not_taken_up(folder: Path, tmp_path: Path) -> None:
+    first = train(BLOCKS, folder, tmp_path / "first", TINY, progress=False, stop=lambda step: step == 6)
+    stale = {"features": torch.zeros(160, 1)}
+    write_tensors(tmp_path / "second" / "features" / "0000.safetensors", stale, {"backbone": "another"})
+    first = train(BLOCKS, folder, tmp_path / "first", TINY, progress=False)
+    assert train(BLOCKS, folder, tmp_path / "second", TINY, progress=False).read_bytes() == first.read_bytes()
+
+
+def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: Path) -> None:
+    network, info = load_network(train(SHORT, folder, tmp_path, TINY, progress=False))
+    frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
+    seen = blocks._see(frames, np.arange(len(frames)), features_in("fp32", network, info))
+    with torch.no_grad():
+        wanted = network.features(normalise(to_float(frames.images(np.arange(3)))))
+    assert seen.dtype == torch.float16
+    assert torch.allclose(seen[:3].float(), wanted, rtol=2e-3, atol=1e-3)
