@@ -145,3 +145,49 @@ def test_cruising_hands_its_throttle_to_following_but_not_to_a_stop() -> None:
     assert follow.throttle == pytest.approx(0.25)
     stop = longitudinal_step(Affordances(hazard_stop=1.0), 20.0, STRAIGHT, 30.0, cruising, 0.1, DEFAULT_LAWS)
     assert stop.memory.pid == PIDState()
+
+
+def wait(seconds: float, laws: LongitudinalConfig, **affordances: float) -> list[Longitudinal]:
+    """What a standing car does that moves off as soon as it is let."""
+    results, memory, speed = [], Memory(), 0.0
+    for _ in range(round(seconds / 0.1)):
+        results.append(longitudinal_step(Affordances(**affordances), speed, STRAIGHT, 30.0, memory, 0.1, laws))
+        memory, speed = results[-1].memory, 3.0 if results[-1].throttle > 0 else 0.0
+    return results
+
+
+def test_a_hazard_that_nobody_could_be_is_passed_at_a_walking_pace() -> None:
+    results = wait(25.0, DEFAULT_LAWS, hazard_stop=0.95, vehicle_distance=50.0)
+    assert all(r.state is DriveState.HAZARD_STOP and r.brake == 1.0 for r in results[:149])
+    assert all(r.state is DriveState.CRUISING and r.target_speed == 4.0 for r in results[151:])
+    assert results[-1].throttle > 0
+
+
+def test_after_a_hazard_is_gone_the_next_one_is_waited_for_as_long() -> None:
+    before = wait(20.0, DEFAULT_LAWS, hazard_stop=0.95)[-1]
+    gone = longitudinal_step(Affordances(), 3.0, STRAIGHT, 30.0, before.memory, 0.1, DEFAULT_LAWS)
+    assert (gone.state, gone.target_speed, gone.memory.waited) == (DriveState.CRUISING, 30.0, 0.0)
+    again = longitudinal_step(Affordances(hazard_stop=0.9), 3.0, STRAIGHT, 30.0, gone.memory, 0.1, DEFAULT_LAWS)
+    assert (again.state, again.brake) == (DriveState.HAZARD_STOP, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("laws", "seen"),
+    [
+        (DEFAULT_LAWS, {"hazard_stop": 0.9, "vehicle_distance": 6.0}),
+        (DEFAULT_LAWS, {"hazard_stop": 0.9, "red_light": 0.9}),
+        (PAPER_LAWS, {"hazard_stop": 0.9}),
+    ],
+)
+def test_a_car_ahead_a_red_light_and_the_paper_wait_as_long_as_it_takes(
+    laws: LongitudinalConfig, seen: dict[str, float]
+) -> None:
+    assert all(r.throttle == 0.0 for r in wait(60.0, laws, **seen))
+
+
+def test_a_moving_car_stops_for_a_hazard_however_long_it_is_seen() -> None:
+    memory = Memory()
+    for _ in range(200):
+        result = longitudinal_step(Affordances(hazard_stop=0.9), 20.0, STRAIGHT, 30.0, memory, 0.1, DEFAULT_LAWS)
+        memory = result.memory
+        assert result.brake == 1.0

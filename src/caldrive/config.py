@@ -62,7 +62,8 @@ class PIDGains:
 
 @dataclass(frozen=True)
 class LongitudinalConfig:
-    """The five states' thresholds and laws. Speeds in km/h, distances in m; see control/presets.py for the reasons."""
+    """The five states' thresholds and laws. Speeds in km/h, distances in m, hazard_patience in s; see
+    control/presets.py for the reasons."""
 
     cruise: PIDGains = PIDGains(0.09, 0.02, 0.0, low=-0.3)
     follow: PIDGains = PIDGains(0.09, 0.01, 0.0)
@@ -79,6 +80,8 @@ class LongitudinalConfig:
     red_gain: float = 1.5
     red_floor: float = 0.8
     hazard_threshold: float = 0.4
+    hazard_patience: float = 15.0
+    creep_speed: float = 4.0
     hold_speed: float = 1.0
     hold_brake: float = 0.3
 
@@ -221,7 +224,7 @@ class TrainingConfig:
     block_steps: int = 3_000
     block_batch: int = 256
     validation_share: float = 0.05
-    evaluate_every: int = 1000
+    evaluate_every: int = 2000
     save_every: int = 100
     cache_gb: float = 4.0
     precision: str = "auto"

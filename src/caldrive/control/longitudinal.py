@@ -8,19 +8,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from caldrive.config import LongitudinalConfig
 from caldrive.control.pid import PIDState, clip, pid_step
 from caldrive.datatypes import Affordances, Command, DriveState
 
+CAR_AS_HAZARD = 15.0  # m; a car that is a hazard is nearer
+
 
 @dataclass(frozen=True)
 class Memory:
-    """What is carried from one step to the next: the last state, and the PID of cruising or following."""
+    """What is carried from one step to the next: the last state, the PID of cruising or following, and the seconds
+    that the car has stood before a hazard that is no car."""
 
     state: DriveState = DriveState.CRUISING
     pid: PIDState = field(default_factory=PIDState)
+    waited: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,17 @@ def choose_state(affordances: Affordances, speed: float, target: float, config: 
     if affordances.vehicle_distance < config.follow_distance:
         return DriveState.FOLLOWING
     return DriveState.CRUISING
+
+
+def seconds_waited(
+    affordances: Affordances, speed: float, memory: Memory, dt: float, config: LongitudinalConfig
+) -> float:
+    """How long the car has stood before a hazard that is no car, or has crept on since; speed in km/h."""
+    car = affordances.vehicle_distance < CAR_AS_HAZARD
+    if affordances.hazard_stop <= config.hazard_threshold or car:
+        return 0.0
+    waits = memory.waited >= config.hazard_patience or speed < config.hold_speed
+    return memory.waited + dt if waits else 0.0
 
 
 def over_limit_brake(speed: float, target: float, safe: float, config: LongitudinalConfig) -> float:
@@ -116,6 +131,9 @@ def longitudinal_step(
 ) -> Longitudinal:
     """Throttle and brake for one step of dt seconds; speed and limit in km/h."""
     target = cruise_target(limit, command, config)
+    waited = seconds_waited(affordances, speed, memory, dt, config)
+    if waited >= config.hazard_patience:
+        affordances, target = replace(affordances, hazard_stop=0.0), min(target, config.creep_speed)
     state = choose_state(affordances, speed, target, config)
     safe = target
     if affordances.vehicle_distance < config.follow_distance:
@@ -131,4 +149,4 @@ def longitudinal_step(
     else:
         target = safe
         effort, pid = pid_effort(state, speed, target, memory, dt, config)
-    return Longitudinal(max(effort, 0.0), max(-effort, 0.0), state, target, Memory(state, pid))
+    return Longitudinal(max(effort, 0.0), max(-effort, 0.0), state, target, Memory(state, pid, waited))
