@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import shutil
@@ -20,7 +21,9 @@ from caldrive.driving.report_tables import tables
 from caldrive.driving.report_text import report_text
 from caldrive.driving.suites import Driven, suite
 from caldrive.driving.trace import result_values
+from caldrive.driving.witness import trace_path
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
+from tests.test_causes import after, trace
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 ABOUT: dict[str, Any] = {
@@ -57,7 +60,20 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
     still = made[1].folder / "stills" / f"{made[1].driven[4].trial.key}-0.jpg"
     still.parent.mkdir()
     still.write_bytes(simplejpeg.encode_jpeg(np.full((20, 40, 3), 90, np.uint8)))
+    left = {"trace": trace(true_center_distance=after(200, 1.5), command="left")}
+    kept = trace_path(made[1].folder, made[1].driven[4].trial.key)
+    kept.parent.mkdir()
+    kept.write_bytes(gzip.compress(json.dumps(left).encode()))
     return made
+
+
+def test_missed_goals_say_how_they_began(runs: list[Run]) -> None:
+    table = next(one for one in tables(runs) if one.title == "How missed goals began")
+    town = runs[1].driven[4].trial.scenario.town
+    assert table.rows == (("cal", town, "left its lane", "(100, 0)", "left", "1"),)
+    text = "left its lane at (100, 0), left: relative angle off by 0.00 rad"
+    assert text in report_text(runs)
+    assert text in report_page(runs)
 
 
 def test_every_cell_stands_beside_the_papers(runs: list[Run]) -> None:
@@ -86,7 +102,8 @@ def test_the_text_holds_all_tables_and_failures(runs: list[Run]) -> None:
     text = report_text(runs)
     for table in tables(runs):
         assert f"## {table.title}" in text
-    assert text.count("| cal | town0") == len(failures(runs)) // 2
+    listed = text.split("## Failures")[1]
+    assert listed.count("| cal | town0") == len(failures(runs)) // 2
     assert "caldrive benchmark --suite quick --agent cal --cap 20" in text
 
 

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.driving.benchmark import read_results
+from caldrive.driving.causes import Cause, cause
 from caldrive.driving.ledger import read_run
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import Driven
+from caldrive.driving.witness import read_trace
 from caldrive.results import Outcome
 
 UNITS = {"vehicle_distance": "m", "relative_angle": "rad", "center_distance": "m"}
@@ -65,21 +67,30 @@ def conditions(runs: Sequence[Run]) -> list[str]:
 @dataclass(frozen=True)
 class Failure:
     """An episode that missed its goal or broke a rule. before: for each infraction what was wrong in the seconds
-    before it."""
+    before it; cause: how a missed goal began, where that is known."""
 
     run: str
     one: Driven
     before: tuple[str, ...]
+    cause: Cause | None = None
 
 
 def failures(runs: Sequence[Run]) -> list[Failure]:
     """All of them, in the suites' order."""
     return [
-        Failure(run.name, one, tuple(_before(one, k) for k in range(len(one.result.infractions))))
+        Failure(run.name, one, tuple(_before(one, k) for k in range(len(one.result.infractions))), _cause(run, one))
         for run in runs
         for one in run.driven
         if one.result.outcome is not Outcome.SUCCESS or any(i.at_fault for i in one.result.infractions)
     ]
+
+
+def _cause(run: Run, one: Driven) -> Cause | None:
+    """How a missed goal began; where an infraction ended the episode, it is the cause."""
+    if one.result.outcome in (Outcome.SUCCESS, Outcome.FAILED):
+        return None
+    trace = read_trace(run.folder, one.trial.key)
+    return cause(trace) if trace else None
 
 
 def _before(one: Driven, k: int) -> str:

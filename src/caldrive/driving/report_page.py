@@ -95,7 +95,8 @@ def _card(failure: Failure, stills: Sequence[Path]) -> str:
         for path in stills
     )
     driven = f"{one.result.route_done:.0f} of {one.result.route_length:.0f} m in {one.result.duration:.0f} s"
+    began = f"<p>{escape(str(failure.cause))}</p>" if failure.cause else ""
     return (
         f'<article class="card"{attributes}><h3>{escape(one.trial.key)} <em>{escape(failure.run)}</em></h3>'
-        f"<p>{escape(one.result.outcome.value)}; {driven}</p><ol>{''.join(broken)}</ol>{images}</article>"
+        f"<p>{escape(one.result.outcome.value)}; {driven}</p>{began}<ol>{''.join(broken)}</ol>{images}</article>"
     )

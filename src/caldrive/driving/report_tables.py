@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from caldrive.driving.causes import common_places
 from caldrive.driving.measures import cells, comfort, errors, rates, reds
 from caldrive.driving.published import COMFORT, SYSTEMS, km_between, success
-from caldrive.driving.report import UNITS, Run, conditions
+from caldrive.driving.report import UNITS, Run, conditions, failures
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,9 @@ class Table:
 
 def tables(runs: Sequence[Run]) -> list[Table]:
     """All tables of the report."""
-    return [_about(runs), _success(runs), _infractions(runs), _lights(runs), _comfort(runs), _errors(runs)]
+    return [
+        _about(runs), _success(runs), _infractions(runs), _lights(runs), _comfort(runs), _errors(runs), _causes(runs)
+    ]  # fmt: skip
 
 
 def _about(runs: Sequence[Run]) -> Table:
@@ -119,3 +123,15 @@ def _errors(runs: Sequence[Run]) -> Table:
             ))  # fmt: skip
     text = "What the affordances were off by while driving: share of wrong frames, or mean absolute error."
     return Table("Affordances while driving", text, ("agent", "condition", *heads), tuple(rows))
+
+
+def _causes(runs: Sequence[Run]) -> Table:
+    rows = []
+    found = failures(runs)
+    for run in runs:
+        for town in dict.fromkeys(one.trial.scenario.town for one in run.driven):
+            causes = [f.cause for f in found if f.run == run.name and f.one.trial.scenario.town == town and f.cause]
+            for (what, x, y, command), count in common_places(causes):
+                rows.append((run.name, Path(town).stem, what, f"({x}, {y})", command, str(count)))
+    text = "What the car did wrong first in the episodes that missed their goal, and near which place."
+    return Table("How missed goals began", text, ("agent", "town", "what", "near", "command", "episodes"), tuple(rows))

@@ -15,9 +15,11 @@ def report_text(runs: Sequence[Run]) -> str:
         parts += [f"## {table.title}", "", table.text, "", "| " + " | ".join(table.head) + " |"]
         parts += ["|" + "---|" * len(table.head), *("| " + " | ".join(row) + " |" for row in table.rows), ""]
     parts += ["## Failures", "", f"{len(found)} episodes missed their goal or broke a rule.", ""]
-    parts += ["| agent | episode | outcome | infractions | wrong in the 3 s before |", "|---|---|---|---|---|"]
+    head = ("agent", "episode", "outcome", "how it began", "infractions", "wrong in the 3 s before")
+    parts += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for one in found:
         broken = ", ".join(f"{i.kind.value} at {i.time:.1f} s" for i in one.one.result.infractions)
         before = "; ".join(one.before[:3])
-        parts.append(f"| {one.run} | {one.one.trial.key} | {one.one.result.outcome.value} | {broken} | {before} |")
+        cells = (one.run, one.one.trial.key, one.one.result.outcome.value, str(one.cause or ""), broken, before)
+        parts.append("| " + " | ".join(cells) + " |")
     return "\n".join(parts) + "\n"
