@@ -17,6 +17,7 @@ from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network import Network
 from caldrive.perception.precision import features_in
 from caldrive.perception.training import train
 from tests.perception_data import HEIGHT, TINY, WIDTH, record
@@ -89,12 +90,32 @@ def test_a_finished_run_stays_as_it_is(folder: Path, tmp_path: Path, monkeypatch
     assert train(BLOCKS, folder, tmp_path, TINY, progress=False).read_bytes() == before
 
 
-def test_features_of_another_backbone_are_not_taken_up(folder: Path, tmp_path: Path) -> None:
-    first = train(BLOCKS, folder, tmp_path / "first", TINY, progress=False, stop=lambda step: step == 6)
-    stale = {"features": torch.zeros(160, 1)}
-    write_tensors(tmp_path / "second" / "features" / "0000.safetensors", stale, {"backbone": "another"})
-    first = train(BLOCKS, folder, tmp_path / "first", TINY, progress=False)
-    assert train(BLOCKS, folder, tmp_path / "second", TINY, progress=False).read_bytes() == first.read_bytes()
+def test_features_of_another_run_are_not_taken_up(folder: Path, tmp_path: Path) -> None:
+    wanted = train(BLOCKS, folder, tmp_path / "wanted", TINY, progress=False)
+    stale = {"features": torch.zeros(160, 256)}
+    write_tensors(tmp_path / "again" / "features" / "0000.safetensors", stale, {"digest": "another"})
+    assert train(BLOCKS, folder, tmp_path / "again", TINY, progress=False).read_bytes() == wanted.read_bytes()
+
+
+def test_the_digest_of_features_depends_on_all_that_makes_them(folder: Path, tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
+    fewer = Frames(find_episodes(folder)[1:], (HEIGHT, WIDTH))
+    first, second = Network(TINY).backbone, Network(TINY).backbone
+    same = blocks._digest(first, "int8", (1.0,), frames)
+    assert blocks._digest(first, "int8", (1.0,), frames) == same
+    others = [
+        blocks._digest(second, "int8", (1.0,), frames), blocks._digest(first, "fp32", (1.0,), frames),
+        blocks._digest(first, "int8", (2.0,), frames), blocks._digest(first, "int8", (1.0,), fewer),
+    ]  # fmt: skip
+    assert len({same, *others}) == 5
+
+
+def test_a_kill_after_the_last_lesson_leaves_no_features(folder: Path, tmp_path: Path) -> None:
+    train(BLOCKS, folder, tmp_path, TINY, progress=False)
+    write_tensors(tmp_path / "features" / "0000.safetensors", {"features": torch.zeros(1)}, {})
+    train(BLOCKS, folder, tmp_path, TINY, progress=False)
+    assert not (tmp_path / "features").exists()
 
 
 def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: Path) -> None:

@@ -52,6 +52,13 @@ def test_a_stop_that_is_right_or_short_is_no_cause() -> None:
     assert cause(trace(state="hazard stop", speed=short)).seen == "stood for 15 % of the time"
 
 
+def test_a_stop_that_flickers_is_one_and_short_ones_are_none() -> None:
+    flickers = [5.0] * 300 + ([0.0] * 30 + [1.0] * 10) * 5 + [5.0] * 100
+    assert cause(trace(state="hazard stop", speed=flickers)).x == 150.0
+    lags = [5.0] * 100 + ([0.0] * 20 + [5.0] * 60) * 6 + [5.0] * 20
+    assert cause(trace(state="hazard stop", speed=lags)).what == "was too slow"
+
+
 def test_what_came_first_counts() -> None:
     stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
     assert cause(trace(true_center_distance=after(250, 2.0), **stop)).what == "left its lane"

@@ -92,8 +92,9 @@ def test_training_paints_where_the_recording_tells_how(tmp_path: Path) -> None:
     for semantic in (False, True):
         record(tmp_path / str(semantic), semantic=semantic)
     config = TrainingConfig(
-        steps=2, batch=4, warm_up=1, segmentation=0.0, evaluate_every=9, precision="fp32", validation_share=0.3
-    )
+        steps=2, batch=4, warm_up=1, block_steps=0, segmentation=0.0, evaluate_every=9, precision="fp32",
+        validation_share=0.3,
+    )  # fmt: skip
     first, second = (
         train(config, tmp_path / name, tmp_path / f"out{name}", TINY, progress=False) for name in ("False", "True")
     )

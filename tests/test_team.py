@@ -23,7 +23,7 @@ PLAIN = PerceptionConfig(**{
 })  # fmt: skip
 PLAIN = replace(PLAIN, batch_norm=False)
 SHORT = TrainingConfig(
-    steps=1, batch=4, warm_up=1, evaluate_every=2, save_every=1, precision="fp32", augment=False,
+    steps=1, batch=4, warm_up=1, block_steps=0, evaluate_every=2, save_every=1, precision="fp32", augment=False,
     validation_share=0.3, device="cpu",
 )  # fmt: skip
 

@@ -203,9 +203,9 @@ class TrainingConfig:
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
     segmentation: weight of the second lesson's loss, where the recording has semantic images; 0 leaves it out.
-    block_steps: after the others, steps in which the task blocks learn alone, from block_batch frames each with their
-    history, which the finished backbone saw once; until then each frame is seen as a stream's first one. 0: the blocks
-    see their history from the first step on.
+    block_steps: after the others, steps in which the task blocks learn alone, from block_batch windows with their
+    history, whose frames the finished backbone saw once; until then a window is seen as if its stream began there. 0:
+    the blocks see their history from the first step on.
     balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu, cuda, or
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.

@@ -14,7 +14,7 @@ from caldrive.config import LongitudinalConfig
 from caldrive.control.pid import PIDState, clip, pid_step
 from caldrive.datatypes import Affordances, Command, DriveState
 
-CAR_AS_HAZARD = 15.0  # m; a car that is a hazard is nearer
+CAR_AS_HAZARD = 15.0  # m; a car that is a hazard is nearer, unless its middle lies beside A3
 
 
 @dataclass(frozen=True)

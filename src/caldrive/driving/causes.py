@@ -14,7 +14,7 @@ Columns = Mapping[str, list[Any]]
 OFF_LANE = 1.3  # m from the centre line: a wheel is over the marking of a lane of 4 m
 BEFORE = 2.0  # s in which what is seen leads to what happens
 STANDING = 0.3  # m/s
-NEEDLESS = 10.0  # s of standing for nothing, all together, that make a goal be missed
+NEEDLESS, FLICKER = 10.0, 3.0  # s of a stop for nothing that make a goal be missed, and of a pause within it
 GRID = 10.0  # m within which places are one
 
 
@@ -49,14 +49,17 @@ def cause(trace: Columns) -> Cause:
 
 
 def _needless(trace: Columns, name: str) -> int | None:
-    """Where the car first stands for nothing, if all together it does for too long."""
+    """Where a stop for nothing begins that lasts too long; moments in which it is not seen do not end it."""
+    time = np.array(trace["time"])
     stands = np.flatnonzero(
         (np.array(trace["speed"]) < STANDING)
         & (np.array(trace["state"]) == name.replace("_", " "))
         & (np.array(trace[f"true_{name}"], dtype=float) < 0.5)
     )
-    step = (trace["time"][-1] - trace["time"][0]) / max(1, len(trace["time"]) - 1)
-    return int(stands[0]) if len(stands) * step >= NEEDLESS else None
+    for stop in np.split(stands, np.flatnonzero(np.diff(time[stands]) > FLICKER) + 1):
+        if len(stop) and time[stop[-1]] - time[stop[0]] >= NEEDLESS:
+            return int(stop[0])
+    return None
 
 
 def _seen(trace: Columns, at: int, what: str) -> str:

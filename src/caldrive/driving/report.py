@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +88,13 @@ def failures(runs: Sequence[Run]) -> list[Failure]:
 
 def _cause(run: Run, one: Driven) -> Cause | None:
     """How a missed goal began; where an infraction ended the episode, it is the cause."""
-    if one.result.outcome in (Outcome.SUCCESS, Outcome.FAILED):
-        return None
-    trace = read_trace(run.folder, one.trial.key)
+    missed = one.result.outcome not in (Outcome.SUCCESS, Outcome.FAILED)
+    return _began(run.folder, one.trial.key) if missed else None
+
+
+@lru_cache(maxsize=8192)  # every part of a report asks
+def _began(folder: Path, key: str) -> Cause | None:
+    trace = read_trace(folder, key)
     return cause(trace) if trace else None
 
 

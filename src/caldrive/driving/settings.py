@@ -166,7 +166,7 @@ class TrainSettings:
     out: Path = Path("out/training")
     """Folder for model.safetensors, the state of the run, its metrics and their curves."""
     steps: int | None = None
-    """Steps of the optimizer, where the preset's are not wanted."""
+    """Steps of the whole network, where the preset's are not wanted; those of its blocks alone follow."""
     preset: str = "small"
     """small, for two cores, or paper: full width, from VGG16's ImageNet weights."""
     imagenet: Path | None = None

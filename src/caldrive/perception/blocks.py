@@ -7,6 +7,7 @@ a hundredth of the time of a step with images.
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import shutil
 from collections.abc import Callable, Iterator
@@ -30,8 +31,9 @@ from caldrive.perception.specs import loss
 FOLDER, CHUNK, BATCH = "features", 8192, 64  # frames in a file, and at once
 
 
-def _digest(backbone: Backbone) -> str:
-    found = hashlib.sha256()
+def _digest(backbone: Backbone, precision: str, ranges: tuple[float, ...], frames: Frames) -> str:
+    """Of all that the features depend on: the backbone, how it computes, and which frames it sees."""
+    found = hashlib.sha256(repr((precision, ranges, frames.episodes)).encode())
     for value in backbone.state_dict().values():
         found.update(value.detach().cpu().numpy().tobytes())
     return found.hexdigest()[:16]
@@ -40,17 +42,17 @@ def _digest(backbone: Backbone) -> str:
 @torch.inference_mode()
 def _see(frames: Frames, ids: Ids, features: Features) -> Tensor:
     """Features (N, F) of frames by number, in 16 bits."""
-    parts = np.array_split(ids, max(1, len(ids) // BATCH))
+    parts = (ids[k : k + BATCH] for k in range(0, len(ids), BATCH))
     return torch.cat([features(normalise(to_float(frames.images(part)))).half() for part in parts])
 
 
 def _kept(path: Path, digest: str) -> Tensor | None:
-    """The features in a file, where they are those of this backbone."""
+    """The features in a file, where they are the wanted ones."""
     try:
         tensors, header = read_tensors(path)
     except CheckpointError:
         return None
-    return tensors["features"] if header.get("backbone") == digest else None
+    return tensors["features"] if header.get("digest") == digest else None
 
 
 def feature_table(run: Run, info: CheckpointInfo, out: Path, done: Callable[[int], None]) -> Tensor:
@@ -58,17 +60,20 @@ def feature_table(run: Run, info: CheckpointInfo, out: Path, done: Callable[[int
     a kill. info: of the network as it is stored; done: told how many frames are seen."""
     network, frames = run.network.cpu().eval(), run.sampler.frames
     round_to_half(network)
-    digest, parts = _digest(network.backbone), []
-    features = features_in(driving_precision("auto", info), network, info)
+    precision = driving_precision("auto", info)
+    digest = _digest(network.backbone, precision, info.ranges, frames)
+    features = features_in(precision, copy.deepcopy(network), info)
+    config = network.config
+    table = torch.empty(len(frames), network.backbone.n_features(config.image_height, config.image_width)).half()
     for number, first in enumerate(range(0, len(frames), CHUNK)):
-        path = out / FOLDER / f"{number:04d}.safetensors"
+        path, ids = out / FOLDER / f"{number:04d}.safetensors", np.arange(first, min(first + CHUNK, len(frames)))
         part = _kept(path, digest)
         if part is None:
-            part = _see(frames, np.arange(first, min(first + CHUNK, len(frames))), features)
-            write_tensors(path, {"features": part}, {"kind": "features", "backbone": digest})
-        parts.append(part)
-        done(first + len(part))
-    return torch.cat(parts)
+            part = _see(frames, ids, features)
+            write_tensors(path, {"features": part}, {"kind": "features", "digest": digest})
+        table[ids[0] : ids[-1] + 1] = part
+        done(int(ids[-1]) + 1)
+    return table
 
 
 def forget_features(out: Path) -> None:
@@ -79,13 +84,14 @@ def forget_features(out: Path) -> None:
 def learn_blocks(run: Run, features: Tensor) -> Iterator[float]:
     """Trains the blocks of the run's network on features (N, F) of all its frames; yields each step's loss."""
     network, frames = run.network, run.sampler.frames
-    config = replace(run.config, steps=run.config.block_steps)
+    config = replace(run.config, steps=run.config.block_steps)  # the rate's warm-up and cosine begin anew
     weights = {name: weight.cpu() for name, weight in run.weights.items()}
     optimizer = Adam(network.blocks.parameters(), config.learning_rate)
     network.blocks.train()
     for step in range(config.block_steps):
-        torch.manual_seed(config.seed * 1_000_003 + config.steps + step)  # dropout
-        starts = run.sampler.draw(run.config.steps + step, config.block_batch)
+        number = run.config.steps + step  # of the whole training
+        torch.manual_seed(config.seed * 1_000_003 + number)  # dropout
+        starts = run.sampler.draw(number, config.block_batch)
         for group in optimizer.param_groups:
             group["lr"] = learning_rate(step, config)
         total = loss(*_lesson(network, frames, features, starts, config.window), weights)

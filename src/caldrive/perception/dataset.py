@@ -54,6 +54,7 @@ class Frames:
 
     def __init__(self, episodes: Sequence[Episode], size: tuple[int, int], cache_gb: float = 0.0) -> None:
         self.size = size
+        self.episodes = tuple((e.key, len(e)) for e in episodes)
         self.labels = {name: np.concatenate([e.columns[name] for e in episodes]) for name in LABELS}
         words = np.concatenate([e.columns["command"] for e in episodes])
         self.command = np.array([COMMAND_NUMBERS[word] for word in words], dtype=np.int64)

@@ -100,10 +100,11 @@ def train(
     """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
 
     In `out` lie also state.safetensors, from which the same call resumes, and metrics.jsonl: a row a step with its
-    loss, and validation metrics every `evaluate_every` steps and at the end; `features` holds what the finished
-    backbone makes of the frames while the blocks learn; curves.png draws them, and where
-    TensorBoard is installed it finds them in `out`/tensorboard. `stop` may end the run early after a step. Under
-    torchrun the processes share each batch out, and the first one writes.
+    loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them, and where
+    TensorBoard is installed it finds them in `out`/tensorboard. While the blocks learn alone, `features` holds what the
+    finished backbone makes of the frames; before that the network has learnt to see without history, and its metrics
+    are those without. `stop` may end the run early after a step. Under torchrun the processes share each batch out,
+    and the first one writes.
     """
     out, perception = Path(out), perception or PerceptionConfig()
     team = join(config.device, config.batch)
@@ -133,7 +134,8 @@ def train(
 def _finish(run: Run, held: Frames, out: Path, rows: list[Row], board: Board, bar: Progress) -> None:
     """The blocks learn alone, unless they did already."""
     last = run.config.steps + run.config.block_steps
-    if kept_rows(out / METRICS, last)[-1]["step"] == last:
+    if any(row["step"] == last for row in kept_rows(out / METRICS, last)):
+        forget_features(out)
         return
     task = bar.add_task("features", total=len(run.sampler.frames), note="features")
     info = load_network(out / MODEL)[1]
@@ -141,11 +143,12 @@ def _finish(run: Run, held: Frames, out: Path, rows: list[Row], board: Board, ba
     task = bar.add_task("blocks", total=run.config.block_steps, note="")
     for step, loss in enumerate(learn_blocks(run, features), start=1):
         rows.append({"step": run.config.steps + step, "loss": loss})
+        board.add(rows[-1])
         bar.update(task, completed=step, note=f"blocks' loss {loss:.3f}")
     run.network.to(run.team.device)
     rows[-1] |= validate(run, held, out / MODEL, run.network.span - 1)
-    draw_curves(rows, out / CURVES)
     board.add(rows[-1])
+    draw_curves(rows, out / CURVES)
     write_whole(out / METRICS, "".join(json.dumps(row) + "\n" for row in rows).encode())
     forget_features(out)
 
