@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from caldrive.config import BlockConfig, PerceptionConfig
-from caldrive.datatypes import Affordances, Command, Control, Image, Pose, Scenario
+from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Pose, Scenario
 from caldrive.episodes import EpisodeWriter, Frame
 
 HEIGHT, WIDTH = 32, 64
@@ -42,7 +42,10 @@ def make_frame(index: int, center_distance: float = 0.0, hazard: bool = False, c
     command = (Command.LEFT, Command.STRAIGHT, Command.RIGHT)[index // 4 % 3]
     clean, driven = Control(0.5, 0.0, 0.1), Control(0.5, 0.0, -0.2)
     inside = index % 8 == 7
-    return Frame(index, index / 10, 5.0, command, labels, driven, clean, image, camera, camera / 2, 0.1, None, inside)
+    other = Alternative(Command.LEFT, 0.3, center_distance) if command is Command.RIGHT else None
+    return Frame(
+        index, index / 10, 5.0, command, labels, driven, clean, image, camera, camera / 2, 0.1, None, inside, other
+    )  # fmt: skip
 
 
 def record(folder: Path, n_episodes: int = 3, n_frames: int = 40, n_cameras: int = 2, semantic: bool = False) -> Path:

@@ -89,8 +89,15 @@ def test_each_camera_has_the_labels_of_its_own_place(episode: Episode) -> None:
 def test_frames_inside_a_junction_are_marked(tmp_path: Path) -> None:
     before_turns = replace(TINY, episodes=1, duration=9.0, cars=0, people=0, before_signs=0.0, before_turns=1.0, seed=3)
     list(collect(before_turns, tmp_path))
-    inside = read_episode(episode_path(tmp_path, 0)).columns["junction"]
+    episode = read_episode(episode_path(tmp_path, 0))
+    inside = episode.columns["junction"]
     assert 0.05 < inside.mean() < 0.95
+    others = [frame for frame in episode if frame.other is not None]
+    assert 0.05 < len(others) / len(episode) < 0.95
+    assert all(frame.other and frame.other.command is not frame.command for frame in others)
+    apart = [abs(frame.other.center_distance - frame.affordances.center_distance) for frame in others if frame.other]
+    assert min(apart) < 0.02  # the ways are one before the junction,
+    assert max(apart) > 1.0  # and part inside
 
 
 def test_the_cameras_see_different_pictures_that_change(episode: Episode) -> None:

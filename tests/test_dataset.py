@@ -50,3 +50,22 @@ def test_images_from_memory_and_from_jpeg_are_the_same(folder: Path, frames: Fra
 def test_another_image_size_is_refused(folder: Path) -> None:
     with pytest.raises(EpisodeError, match="64 x 32, the network takes 200 x 88"):
         Frames(find_episodes(folder), (88, 200), cache_gb=1.0)
+
+
+def test_another_command_changes_what_depends_on_it_and_nothing_else(frames: Frames) -> None:
+    ids = np.arange(12)[:, None]  # the commands change every four frames: left, straight, right
+    command, targets = frames.lessons(ids)
+    turned, others = frames.lessons(ids, np.arange(12) != 11)
+    assert command[:, 0].tolist() == [0] * 4 + [1] * 4 + [2] * 4
+    assert turned[:, 0].tolist() == [0] * 4 + [1] * 4 + [0] * 3 + [2]
+    angle = 0.759
+    assert (targets["relative_angle"] * angle).numpy() == pytest.approx(0.1)
+    assert (others["relative_angle"] * angle).numpy() == pytest.approx(np.array([0.1] * 8 + [0.3] * 3 + [0.1]))
+    assert all((targets[name] == others[name]).all() for name in targets if name != "relative_angle")
+
+
+def test_a_batch_may_ask_what_another_command_would(frames: Frames) -> None:
+    starts = np.array([0, 8])
+    batch = frames.batch(starts, 2, 3, np.array([True, True]))
+    assert batch.command.tolist() == [[0, 0], [0, 0]]
+    assert frames.batch(starts, 2, 3).command.tolist() == [[0, 0], [2, 2]]

@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from caldrive.datatypes import Command
+from caldrive.datatypes import Alternative, Command
 from caldrive.episode_reader import read_episode
-from caldrive.episodes import EpisodeError, EpisodeWriter
+from caldrive.episodes import FORMAT_VERSION, EpisodeError, EpisodeWriter
 from caldrive.scenarios import scenario_from_json, scenario_to_json
 from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
 
@@ -24,6 +24,15 @@ def path(tmp_path: Path) -> Path:
             for camera in (1, 0):
                 writer.append(make_frame(index, index / 4, hazard=index == 2, camera=camera))
     return path
+
+
+def test_gives_back_what_another_command_would_ask_for(tmp_path: Path) -> None:
+    with EpisodeWriter(tmp_path / "drive.parquet", SCENARIO) as writer:
+        for index in (0, 8):
+            writer.append(make_frame(index, 0.5))
+    episode = read_episode(tmp_path / "drive.parquet")
+    assert [frame.other for frame in episode] == [None, Alternative(Command.LEFT, 0.3, 0.5)]
+    assert episode.columns["other_command"].tolist() == ["", "left"]
 
 
 def test_gives_back_what_was_written(path: Path) -> None:
@@ -100,7 +109,11 @@ def test_missing_damaged_and_foreign_files_are_told_apart(path: Path, tmp_path: 
 
 def test_another_version_is_refused(path: Path) -> None:
     table = pq.read_table(path)
-    metadata = {b"caldrive": table.schema.metadata[b"caldrive"].replace(b'"version": 2', b'"version": 99')}
+    metadata = {
+        b"caldrive": table.schema.metadata[b"caldrive"].replace(
+            f'"version": {FORMAT_VERSION}'.encode(), b'"version": 99'
+        )
+    }
     pq.write_table(table.replace_schema_metadata(metadata), path)
     with pytest.raises(EpisodeError, match="format 99"):
         read_episode(path)

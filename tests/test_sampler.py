@@ -39,6 +39,13 @@ def test_draws_depend_on_seed_and_step_only(frames: Frames) -> None:
     assert first.draw(7, 9).tolist() != first.draw(8, 9).tolist()
 
 
+def test_half_of_the_windows_may_be_seen_with_another_command(frames: Frames) -> None:
+    sampler = Sampler(frames, 1, 0.5, seed=3)
+    assert sampler.others(7, 1000).mean() == pytest.approx(0.5, abs=0.06)
+    assert (sampler.others(7, 1000) == sampler.others(7, 1000)).all()
+    assert (sampler.others(7, 1000) != sampler.others(8, 1000)).any()
+
+
 def test_validation_windows_cover_each_frame_once(frames: Frames) -> None:
     starts = np.concatenate(list(every_window(frames, 5, batch=7)))
     seen = (starts[:, None] + np.arange(5)).ravel()

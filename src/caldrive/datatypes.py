@@ -136,6 +136,15 @@ class Affordances:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """Another command that could be given, and the affordances that depend on it, as in `Affordances`."""
+
+    command: Command
+    relative_angle: float
+    center_distance: float
+
+
+@dataclass(frozen=True)
 class Observation:
     """All that an agent may see: time (s), image (H, W, 3), speed (m/s) and the command."""
 

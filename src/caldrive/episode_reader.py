@@ -15,8 +15,18 @@ import pyarrow.parquet as pq
 import simplejpeg
 from numpy.typing import NDArray
 
-from caldrive.datatypes import Affordances, Command, Control, Image, Scenario
-from caldrive.episodes import CONTROLS, FORMAT_VERSION, LABELS, METADATA_KEY, SCHEMA, SEMANTIC, EpisodeError, Frame
+from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Scenario
+from caldrive.episodes import (
+    CONTROLS,
+    FORMAT_VERSION,
+    LABELS,
+    METADATA_KEY,
+    OTHER,
+    SCHEMA,
+    SEMANTIC,
+    EpisodeError,
+    Frame,
+)
 from caldrive.scenarios import scenario_from_json
 
 
@@ -25,8 +35,9 @@ class Episode:
     """A recording in memory: columns (N,) by name, images still as JPEG.
 
     columns: episode, frame, camera, camera_left, camera_yaw, time, speed, command (the values of `Command`), junction,
-    the six labels (speed_sign is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera,
-    then by frame. semantics: a zipped byte a pixel for each row, where they were recorded and asked for.
+    other_command (empty for none) with its other_relative_angle and other_center_distance, the six labels (speed_sign
+    is 0 for none), driven_* and clean_* throttle, brake, steer. Rows are sorted by camera, then by frame. semantics: a
+    zipped byte a pixel for each row, where they were recorded and asked for.
     """
 
     path: Path
@@ -68,6 +79,13 @@ class Episode:
         values = {name: self.columns[name][i].item() for name in LABELS}
         return Affordances(**(values | {"speed_sign": values["speed_sign"] or None}))
 
+    def other(self, i: int) -> Alternative | None:
+        """What another command would ask for in row i, if another one could be given."""
+        if not self.columns["other_command"][i]:
+            return None
+        values = {name: self.columns[f"other_{name}"][i].item() for name in OTHER}
+        return Alternative(Command(self.columns["other_command"][i]), **values)
+
     def __getitem__(self, i: int) -> Frame:
         """Row i with its image decoded."""
         if not -len(self) <= i < len(self):
@@ -88,6 +106,7 @@ class Episode:
             value["camera_yaw"],
             self.semantic(i) if self.semantics is not None else None,
             value["junction"],
+            self.other(i),
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -138,7 +157,9 @@ def _check_values(path: Path, table: pa.Table, columns: dict[str, NDArray[Any]])
     """Raises EpisodeError where rows are missing or hold what no recorder writes."""
     wrong = [name for name in SCHEMA.names if table[name].null_count]
     wrong += [name for name, c in columns.items() if c.dtype.kind == "f" and not np.isfinite(c).all()]
-    wrong += ["command"] * (not set(columns["command"]) <= {command.value for command in Command})
+    commands = {command.value for command in Command}
+    wrong += ["command"] * (not set(columns["command"]) <= commands)
+    wrong += ["other_command"] * (not set(columns["other_command"]) <= commands | {""})
     if not len(table) or wrong:
         what = f"values in {wrong[0]} that cannot be" if wrong else "no rows"
         raise EpisodeError(f"{path} has {what}: remove it and record again")

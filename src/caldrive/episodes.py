@@ -20,15 +20,16 @@ import pyarrow.parquet as pq
 import simplejpeg
 from numpy.typing import NDArray
 
-from caldrive.datatypes import Affordances, Command, Control, Image, Scenario
+from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Scenario
 from caldrive.files import write_whole
 from caldrive.scenarios import scenario_to_json
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 METADATA_KEY = b"caldrive"
 JPEG_QUALITY = 90
 LABELS = tuple(f.name for f in fields(Affordances))
 CONTROLS = tuple(f.name for f in fields(Control))
+OTHER = ("relative_angle", "center_distance")
 PLAIN = ("camera", "camera_left", "camera_yaw", "time", "speed", "junction")
 
 SCHEMA = pa.schema(
@@ -39,6 +40,8 @@ SCHEMA = pa.schema(
         *((name, pa.float64()) for name in ("camera_left", "camera_yaw", "time", "speed")),
         ("command", pa.string()),
         ("junction", pa.bool_()),
+        ("other_command", pa.string()),  # empty where no other one could be given
+        *((f"other_{name}", pa.float64()) for name in OTHER),
         *((name, pa.int64() if name == "speed_sign" else pa.float64()) for name in LABELS),
         *((f"{kind}_{name}", pa.float64()) for kind in ("driven", "clean") for name in CONTROLS),
         ("image", pa.binary()),
@@ -58,7 +61,7 @@ class Frame:
     index: number of the moment, from 0. camera: its id, with its lateral offset (m, + left) and yaw (rad, + left).
     affordances: the labels as of a car that stands where the camera looks from. driven: the control that moved the car,
     clean: what the driver wanted before any noise was added. semantic (H, W): the class of each pixel, by number.
-    junction: whether the car is inside one, where no line is painted.
+    junction: whether the car is inside one, where no line is painted. other: what another command would ask for.
     """
 
     index: int
@@ -74,6 +77,7 @@ class Frame:
     camera_yaw: float = 0.0
     semantic: NDArray[np.uint8] | None = None
     junction: bool = False
+    other: Alternative | None = None
 
 
 def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
@@ -81,12 +85,14 @@ def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
     driven = {f"driven_{name}": value for name, value in asdict(frame.driven).items()}
     clean = {f"clean_{name}": value for name, value in asdict(frame.clean).items()}
     plain = {name: getattr(frame, name) for name in PLAIN}
+    other = {f"other_{name}": getattr(frame.other, name) if frame.other else 0.0 for name in OTHER}
+    other["other_command"] = frame.other.command.value if frame.other else ""
     # 4:4:4 keeps the colour of lamps that are a pixel or two wide.
     jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
     named = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
     if frame.semantic is not None:
         named[SEMANTIC.name] = zlib.compress(frame.semantic.tobytes(), 1)
-    return named | plain | labels | driven | clean
+    return named | plain | other | labels | driven | clean
 
 
 class EpisodeWriter:
@@ -117,7 +123,7 @@ class EpisodeWriter:
         pq.write_table(
             pa.Table.from_pylist(self._rows, schema=schema),
             buffer,
-            use_dictionary=["episode", "command"],
+            use_dictionary=["episode", "command", "other_command"],
             compression=dict.fromkeys(columns, "zstd") | {"image": "none"},
         )
         write_whole(self.path, buffer.getvalue())

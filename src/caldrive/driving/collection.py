@@ -75,9 +75,11 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
             seen = zip(mounts, world.images(mounts), semantics, strict=True)
             for camera, (mount, image, semantic) in enumerate(seen):
                 labels = world.labels_at(mount.left, mount.yaw)
+                others = world.alternatives_at(mount.left, mount.yaw)
+                other = others[index % len(others)] if others else None
                 writer.append(
                     Frame(index, observation.time, observation.speed, observation.command, labels, driven, clean,
-                          image, camera, mount.left, mount.yaw, semantic, inside)
+                          image, camera, mount.left, mount.yaw, semantic, inside, other)
                 )  # fmt: skip
             frames += len(mounts)
             world.step(driven)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.optim import Adam
 
@@ -92,9 +93,10 @@ def learn_blocks(run: Run, features: Tensor) -> Iterator[float]:
         number = run.config.steps + step  # of the whole training
         torch.manual_seed(config.seed * 1_000_003 + number)  # dropout
         starts = run.sampler.draw(number, config.block_batch)
+        others = run.sampler.others(number, config.block_batch)
         for group in optimizer.param_groups:
             group["lr"] = learning_rate(step, config)
-        total = loss(*_lesson(network, frames, features, starts, config.window), weights)
+        total = loss(*_lesson(network, frames, features, starts, others, config.window), weights)
         optimizer.zero_grad(set_to_none=True)
         total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(network.blocks.parameters(), config.clip)
@@ -103,10 +105,9 @@ def learn_blocks(run: Run, features: Tensor) -> Iterator[float]:
 
 
 def _lesson(
-    network: Network, frames: Frames, features: Tensor, starts: Ids, window: int
+    network: Network, frames: Frames, features: Tensor, starts: Ids, others: NDArray[np.bool_], window: int
 ) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-    """Outputs and targets of the windows that begin with these frames."""
+    """Outputs and targets of the windows that begin with these frames; others: those with another command."""
     ids = frames.windows(starts, window, network.span - 1)
-    trained = ids[:, -window:]
-    outputs = network(features[torch.from_numpy(ids)].float(), torch.from_numpy(frames.command[trained]))
-    return outputs, {name: target[trained.ravel()] for name, target in frames.targets.items()}
+    command, targets = frames.lessons(ids[:, -window:], others)
+    return network(features[torch.from_numpy(ids)].float(), command), targets

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Command
 from caldrive.episode_reader import Episode
-from caldrive.episodes import LABELS, EpisodeError
+from caldrive.episodes import LABELS, OTHER, EpisodeError
 from caldrive.perception.specs import SPECS, encode_columns
 
 Ids = NDArray[np.int64]
@@ -28,6 +28,7 @@ SIZES = {
     "center_distance": (0.4, 0.8, 1.2),
     "clean_steer": (0.05, 0.15, 0.4),
 }
+NONE = -1  # number of the command that no frame has
 STANDING = 0.25  # weight of a frame in which the car stands: it looks like the one before
 
 
@@ -59,6 +60,10 @@ class Frames:
         words = np.concatenate([e.columns["command"] for e in episodes])
         self.command = np.array([COMMAND_NUMBERS[word] for word in words], dtype=np.int64)
         self.targets = encode_columns(self.labels)
+        words = np.concatenate([e.columns["other_command"] for e in episodes])
+        self.other_command = np.array([COMMAND_NUMBERS.get(word, NONE) for word in words], dtype=np.int64)
+        others = {name: np.concatenate([e.columns[f"other_{name}"] for e in episodes]) for name in OTHER}
+        self.other_targets = {s.name: s.encode(others[s.name]) for s in SPECS if s.conditional}
         self._sizes = [
             np.digitize(np.abs(np.concatenate([e.columns[name] for e in episodes])), edges)
             for name, edges in SIZES.items()
@@ -124,19 +129,31 @@ class Frames:
         ids: Ids = np.maximum(starts[:, None] + np.arange(-context, window), self.stream_start[starts][:, None])
         return ids
 
-    def batch(self, starts: Ids, window: int, context: int) -> Batch:
+    def lessons(self, ids: Ids, other: NDArray[np.bool_] | None = None) -> tuple[Tensor, dict[str, Tensor]]:
+        """Commands (B, S) and targets (B * S,) of frames (B, S); other (B,): where another command is given wherever
+        that could be."""
+        command, targets = self.command[ids], {name: target[ids.ravel()] for name, target in self.targets.items()}
+        if other is not None:
+            turned = other[:, None] & (self.other_command[ids] != NONE)
+            command = np.where(turned, self.other_command[ids], command)
+            chosen = torch.from_numpy(turned.ravel())
+            for name, target in self.other_targets.items():
+                targets[name] = torch.where(chosen, target[ids.ravel()], targets[name])
+        return torch.from_numpy(command), targets
+
+    def batch(self, starts: Ids, window: int, context: int, other: NDArray[np.bool_] | None = None) -> Batch:
         """The windows whose first frames with a loss are `starts`; all of them must lie `window` frames before their
-        stream's end."""
+        stream's end. other: see `lessons`."""
         ids = self.windows(starts, window, context)
         unique, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
-        trained = ids[:, context:]  # (B, S)
+        command, targets = self.lessons(ids[:, context:], other)
         return Batch(
             images=self.images(unique),
             semantics=self.semantics(unique),
             index=torch.from_numpy(inverse.reshape(ids.shape)),
             group=torch.from_numpy(first // ids.shape[1]),
-            command=torch.from_numpy(self.command[trained]),
-            targets={name: target[trained.ravel()] for name, target in self.targets.items()},
+            command=command,
+            targets=targets,
         )
 
     def starts(self, window: int) -> Ids:

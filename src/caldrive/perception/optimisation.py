@@ -92,8 +92,10 @@ class Run:
         seed = (config.seed * 1_000_003 + self.step) * team.size + team.rank
         generator = torch.Generator().manual_seed(seed)
         torch.manual_seed(seed)  # dropout
-        starts = self.sampler.draw(self.step, config.batch)[team.rank :: team.size]
-        batch = self.sampler.frames.batch(starts, config.window, self.context)
+        mine = slice(team.rank, None, team.size)
+        starts = self.sampler.draw(self.step, config.batch)[mine]
+        others = self.sampler.others(self.step, config.batch)[mine]
+        batch = self.sampler.frames.batch(starts, config.window, self.context, others)
         images = normalise(self._augmented(batch, generator))
         targets = {name: target.to(team.device) for name, target in batch.targets.items()}
         for group in self.optimizer.param_groups:

@@ -12,6 +12,8 @@ from caldrive.episodes import EpisodeError
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.specs import SPECS
 
+OTHERS = 0.5  # share of the windows that are seen with another command, if one could be given
+
 
 class Sampler:
     """Draws training windows: the rarer the rarest class or command in it, the likelier a window.
@@ -37,6 +39,10 @@ class Sampler:
         chance = np.random.default_rng((self.seed, step)).random(n) * self._cumulative[-1]
         chosen: Ids = self.starts[np.searchsorted(self._cumulative, chance, side="right")]
         return chosen
+
+    def others(self, step: int, n: int) -> NDArray[np.bool_]:
+        """Which of n windows are seen with another command, if one could be given."""
+        return np.random.default_rng((self.seed, step, 1)).random(n) < OTHERS
 
     def class_counts(self) -> dict[str, NDArray[np.float64]]:
         """How many samples of each class the drawn windows hold, by affordance, in expectation and scaled to the data's

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from caldrive.config import CameraConfig, VehicleConfig
 from caldrive.datatypes import (
     Affordances,
+    Alternative,
     Contact,
     ContactKind,
     Control,
@@ -25,6 +26,7 @@ from caldrive.datatypes import (
     VehicleState,
 )
 from caldrive.geometry import moved, to_local, wrap_angle
+from caldrive.world.alternatives import Fork, alternatives, forks
 from caldrive.world.camera import Camera
 from caldrive.world.contacts import Obstacle, obstacle_of, resolve
 from caldrive.world.labels import label
@@ -67,6 +69,7 @@ class EmbeddedWorld:
         lights, people, cars = (np.random.default_rng([scenario.seed, i]) for i in range(3))
         self.ego_state = EgoState(route.line.pose_at(0.0))
         self.progress = 0.0
+        self._forks: list[Fork] | None = None
         self.lights = Lights(self.roads, lights)
         self._lights_at = _places(self.lights.shown())
         self.vehicles: tuple[VehicleState, ...] = ()
@@ -142,6 +145,13 @@ class EmbeddedWorld:
         """The affordances of a car that stands `left` m beside the ego, turned by `yaw` (the three-camera set-up)."""
         ego = self.ego
         return self._label(replace(ego, pose=moved(ego.pose, left=left, turn=yaw)))
+
+    def alternatives_at(self, left: float, yaw: float) -> list[Alternative]:
+        """What other commands would ask of such a car, where others could be given."""
+        if self._forks is None:
+            self._forks = forks(self.roads, self.route)
+        there = moved(self.ego.pose, left=left, turn=yaw)
+        return alternatives(moved(there, forward=self.vehicle.front_axle), self._forks, self.progress)
 
     def _load(self, town: str, arrangement: int) -> None:
         self.roads = load_town(town)

@@ -102,6 +102,13 @@ def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleSt
     return min([*gaps, MAX_VEHICLE_DISTANCE])
 
 
+def to_line(axle: Pose, line: Polyline, near: float | None = None) -> tuple[float, float, float]:
+    """Relative angle (rad) and centre distance (m, without its limits) of a front axle from a line, both positive where
+    the wheel has to go left, and the arc length of the line there."""
+    hit = line.project(axle.x, axle.y, near)
+    return wrap_angle(hit.heading - axle.heading), -hit.left, hit.s
+
+
 def label(
     ego: VehicleState,
     front_axle: float,
@@ -119,14 +126,14 @@ def label(
     has to go left. Cars count in A2 and A3 only where they are in the way.
     """
     axle = moved(ego.pose, forward=front_axle)
-    hit = route.project(axle.x, axle.y, near)
+    angle, distance, s = to_line(axle, route, near)
     ahead = A3.contains(to_local(axle, _positions(vehicles))) | A2.contains(to_local(axle, _positions(vehicles)))
-    vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, hit.s)]
+    vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, s)]
     return Affordances(
         hazard_stop=float(hazard_stop(axle, vehicles, pedestrians)),
         red_light=float(red_light(axle, lights)),
         speed_sign=speed_sign(axle, signs),
         vehicle_distance=vehicle_distance(ego, axle, vehicles),
-        relative_angle=wrap_angle(hit.heading - axle.heading),
-        center_distance=float(np.clip(-hit.left, -MAX_CENTER_DISTANCE, MAX_CENTER_DISTANCE)),
+        relative_angle=angle,
+        center_distance=float(np.clip(distance, -MAX_CENTER_DISTANCE, MAX_CENTER_DISTANCE)),
     )
