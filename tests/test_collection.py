@@ -108,12 +108,12 @@ def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
     truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0)
     world = SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
     told = []
-    for index, _, telling in collection._moments(world, replace(TINY, duration=5.0)):  # type: ignore[arg-type]
-        world.observation.speed = 5.0 if index >= 60 else 0.0
+    for index, _, telling in collection._moments(world, replace(TINY, duration=20.0)):  # type: ignore[arg-type]
+        world.observation.speed = 5.0 if index >= 200 else 0.0
         told += [index] if telling else []
-    standing = [index for index in told if index <= 60]
-    assert standing == [*range(15), 29, 44, 59]
-    assert told[len(standing) :] == list(range(61, 61 + 50 - len(standing)))  # five seconds that tell something
+    standing = [index for index in told if index <= 200]
+    assert standing == [*range(15), *range(134, 143)]
+    assert told[len(standing) :] == list(range(201, 401 - len(standing)))  # twenty seconds that tell something
 
 
 def test_an_episode_in_which_the_car_stands_on_ends() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from caldrive.config import CameraConfig, CollectConfig, ControlConfig
+from caldrive.config import CameraConfig, CollectConfig, ControlConfig, LongitudinalConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Observation, Scenario
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.disturbance import Disturbance
 from caldrive.driving.pool import spread
@@ -35,7 +35,8 @@ MANIFEST = "manifest.json"
 ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
 PATIENCE = 2  # times an episode's duration
-STANDING, STOOD = 0.1, 15  # m/s; of moments in which the car stands the first ones are recorded, then one in as many
+STANDING = 0.1  # m/s
+STOOD, RUN = 15, 9  # moments that are recorded when the car comes to stand; then a run of these in so many times STOOD
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
 
 
@@ -67,23 +68,34 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
         for index, observation, telling in _moments(world, config):
             clean = agent.act(observation)
             driven = disturbance.apply(clean, observation.speed)
-            if not telling:
-                world.step(driven)
-                continue
-            inside = world.route.inside_junction(world.progress)
-            semantics = world.semantic_images(mounts) if config.semantic else [None] * len(mounts)
-            seen = zip(mounts, world.images(mounts), semantics, strict=True)
-            for camera, (mount, image, semantic) in enumerate(seen):
-                labels = world.labels_at(mount.left, mount.yaw)
-                others = world.alternatives_at(mount.left, mount.yaw)
-                other = others[index % len(others)] if others else None
-                writer.append(
-                    Frame(index, observation.time, observation.speed, observation.command, labels, driven, clean,
-                          image, camera, mount.left, mount.yaw, semantic, inside, other)
-                )  # fmt: skip
-            frames += len(mounts)
+            if telling:
+                for frame in _frames(world, config, mounts, index, clean, driven):
+                    writer.append(frame)
+                frames += len(mounts)
             world.step(driven)
     return frames
+
+
+def _frames(
+    world: EmbeddedWorld,
+    config: CollectConfig,
+    mounts: Sequence[CameraConfig],
+    index: int,
+    clean: Control,
+    driven: Control,
+) -> Iterator[Frame]:
+    """What each camera sees at a moment, with its labels."""
+    observation, inside = world.observation, world.route.inside_junction(world.progress)
+    semantics = world.semantic_images(mounts) if config.semantic else [None] * len(mounts)
+    seen = zip(mounts, world.images(mounts), semantics, strict=True)
+    for camera, (mount, image, semantic) in enumerate(seen):
+        labels = world.labels_at(mount.left, mount.yaw)
+        others = world.alternatives_at(mount.left, mount.yaw)
+        other = others[index % len(others)] if others else None
+        yield Frame(
+            index, observation.time, observation.speed, observation.command, labels, driven, clean, image, camera,
+            mount.left, mount.yaw, semantic, inside, other,
+        )  # fmt: skip
 
 
 def _set_up(
@@ -104,7 +116,9 @@ def _set_up(
     cap = CAPS[int(rng.integers(len(CAPS)))]
     hidden = rng.random() < config.hidden_cars
     oracle = (_HiddenCars if hidden else OraclePerception)(world.truth)
-    agent = CALAgent(oracle, Controller(replace(ControlConfig(), cap=cap)))
+    # Whom no car is told of must not take one for nothing, however long it stands there.
+    laws = replace(LongitudinalConfig(), hazard_patience=math.inf)
+    agent = CALAgent(oracle, Controller(ControlConfig(laws, cap=cap)))
     world.start(scenario, route)
     if rng.random() < config.displaced:
         world.displace(float(rng.uniform(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
@@ -118,7 +132,7 @@ def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[tuple[int,
     wanted, told, stood = round(config.duration / world.dt), 0, 0
     for index in range(PATIENCE * wanted):
         stood = stood + 1 if world.observation.speed < STANDING else 0
-        telling = stood <= STOOD or stood % STOOD == 0
+        telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
         told += telling
         yield index, world.observation, telling
         truth = world.truth()

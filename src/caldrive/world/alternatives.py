@@ -23,8 +23,8 @@ FARTHEST = 4.0  # m beside its line from which a way can still be taken
 
 @dataclass(frozen=True)
 class Fork:
-    """Another way at a junction of a route: the command that asks for it, and its line. The command would hold from
-    `start` to `end` m of the route. The line begins at `offset` m of it, and up to the junction the two are one."""
+    """Another way at a junction of a route: the command that asks for it, and its line. It can be given from `start` to
+    `end` m of the route. The line begins at `offset` m of it, and up to the junction the two are one."""
 
     command: Command
     line: Polyline
@@ -34,19 +34,19 @@ class Fork:
 
 
 def forks(roads: RoadNetwork, route: Route) -> list[Fork]:
-    """All other ways at the junctions of a route, in its order."""
-    found = []
-    for (before, offset), (taken, start) in pairwise(route.lanes):
-        turn = next((turn for turn in route.turns if abs(turn.start - start) < 0.1), None)
-        if turn is None or roads.lanes[taken].turn is None:
+    """All other ways at the junctions of a route, in its order; none to where one command leads to several lanes."""
+    found, turns = [], {round(turn.start, 3): turn for turn in route.turns}
+    for (before, offset), (_, start) in pairwise(route.lanes):
+        if (turn := turns.get(round(start, 3))) is None:
             continue
         begin = max(0.0, offset)
-        for other in (roads.lanes[i] for i in roads.lanes[before].successors):
-            if other.turn in (None, turn.command):
-                continue
-            ids = [before, other.id, *other.successors[:1]]
-            line = follow_lanes(roads, ids, max(0.0, -offset), roads.lanes[ids[-1]].line.length).line
-            found.append(Fork(other.turn, line, begin, max(begin, turn.start - COMMAND_AHEAD), turn.end))
+        ways = [roads.lanes[i] for i in roads.lanes[before].successors]
+        commands = [way.turn for way in ways]
+        for way in ways:
+            if way.turn not in (None, turn.command) and commands.count(way.turn) == 1:
+                ids = [before, way.id, *way.successors[:1]]
+                line = follow_lanes(roads, ids, max(0.0, -offset), roads.lanes[ids[-1]].line.length).line
+                found.append(Fork(way.turn, line, begin, max(begin, turn.start - COMMAND_AHEAD), turn.end))
     return found
 
 
