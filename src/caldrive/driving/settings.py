@@ -202,4 +202,4 @@ class EvaluateSettings:
     worst: Path | None = None
     """A PNG file for the frames that it gets most wrong."""
     precision: str = "auto"
-    """fp32, bf16 or int8; auto is what it drives in."""
+    """fp32, bf16, int8 or int7; auto is what it drives in."""

@@ -1,4 +1,5 @@
-"""The backbone in 8-bit integers through OpenVINO: on a CPU with VNNI four times as fast as torch in 32 bits.
+"""The backbone in 8-bit integers through OpenVINO: on a CPU with VNNI four times as fast as torch in 32 bits,
+on older ones twice.
 
 Post-training quantization (Jacob et al. 2018): weights have a scale for each channel that they give; what enters a
 convolution has one scale, found on recorded images (`calibration.input_ranges`).
@@ -29,10 +30,10 @@ def _rounded(x: Any, top: Any, signed: bool, levels: int) -> Any:
     return ops.fake_quantize(x, np.float32(low), np.float32(top), np.float32(low), np.float32(top), levels)
 
 
-def _convolution(x: Any, conv: nn.Module, top: float, signed: bool) -> Any:
+def _convolution(x: Any, conv: nn.Module, top: float, signed: bool, bits: int) -> Any:
     assert isinstance(conv, nn.Conv2d)
     weight = conv.weight.detach().float().numpy()
-    tops = np.abs(weight).max(axis=(1, 2, 3), keepdims=True)
+    tops = np.abs(weight).max(axis=(1, 2, 3), keepdims=True) * 2 ** (8 - bits)  # of 8 bits only the lower ones are used
     weight = _rounded(ops.constant(np.ascontiguousarray(weight)), np.maximum(tops, 1e-9), True, 255)
     x = ops.convolution(_rounded(x, np.float32(top), signed, 256), weight, [1, 1], [1, 1], [1, 1], [1, 1])
     assert conv.bias is not None
@@ -51,7 +52,7 @@ def _normalised(x: Any, norm: nn.Module) -> Any:
     return ops.add(ops.multiply(x, gain), shift)
 
 
-def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int) -> ov.Model:
+def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int, bits: int) -> ov.Model:
     """The backbone as OpenVINO's graph; its fake quantizations become integers when it is compiled."""
     image = x = ops.parameter([1, 3, height, width], np.float32)
     number = 0
@@ -60,7 +61,7 @@ def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int)
         for conv in stage:
             if conv is not stage[0]:
                 x = ops.relu(x)
-            x = _convolution(x, conv, ranges[number], signed=number == 0)
+            x = _convolution(x, conv, ranges[number], signed=number == 0, bits=bits)
             number += 1
         x = ops.max_pool(x, [2, 2], [1, 1], [0, 0], [0, 0], [2, 2], "floor").output(0)
         x = ops.relu(_normalised(x, norm))
@@ -68,12 +69,15 @@ def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int)
 
 
 class Int8Backbone:
-    """A trained backbone on the CPU for images of one size. ranges: by `input_ranges`; threads: how many it may use.
+    """A trained backbone on the CPU for images of one size. ranges: by `input_ranges`; threads: how many it may use;
+    bits: of a weight, 7 for a processor that adds pairs of products in 16 bits.
 
     Raises ValueError where the ranges are not this backbone's, or where they or its weights are not numbers.
     """
 
-    def __init__(self, backbone: Backbone, ranges: Sequence[float], height: int, width: int, threads: int) -> None:
+    def __init__(
+        self, backbone: Backbone, ranges: Sequence[float], height: int, width: int, threads: int, bits: int = 8
+    ) -> None:
         if len(ranges) != len(backbone.convolutions()):
             raise ValueError(
                 f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network anew"
@@ -84,7 +88,7 @@ class Int8Backbone:
             "INFERENCE_NUM_THREADS": threads, "INFERENCE_PRECISION_HINT": "f32", "PERFORMANCE_HINT": "LATENCY",
             "ENABLE_CPU_PINNING": False,
         }  # fmt: skip
-        compiled = ov.Core().compile_model(_graph(backbone, ranges, height, width), "CPU", settings)
+        compiled = ov.Core().compile_model(_graph(backbone, ranges, height, width, bits), "CPU", settings)
         self._request = compiled.create_infer_request()
 
     def __call__(self, images: Tensor) -> Tensor:

@@ -13,7 +13,8 @@ from caldrive.perception.checkpoint import CheckpointInfo
 from caldrive.perception.network import Network
 
 Features = Callable[[Tensor], Tensor]  # a backbone: normalised images (N, 3, H, W) to features (N, F)
-PRECISIONS = ("auto", "fp32", "bf16", "int8")
+INTEGERS = ("int8", "int7")  # int7: weights have 7 bits
+PRECISIONS = ("auto", "fp32", "bf16", *INTEGERS)
 
 
 def _bf16_pays() -> bool:
@@ -23,10 +24,13 @@ def _bf16_pays() -> bool:
     return bool(able.get("amx_bf16") or (able.get("avx512_bf16") and "Intel" not in able.get("cpu_name", "")))
 
 
-def _int8_pays() -> bool:
-    """Whether this processor adds products of bytes in 32 bits; older ones do it in 16, slower and not always right."""
+def _integers() -> str | None:
+    """int8 where the processor adds products of bytes in 32 bits (VNNI), int7 where it adds pairs of them in 16, which
+    weights of 8 bits would overflow; None where integers do not pay."""
     able = torch.cpu.get_capabilities()
-    return any(able.get(name) for name in ("avx512_vnni", "avx_vnni", "amx_int8"))
+    if any(able.get(name) for name in ("avx512_vnni", "avx_vnni", "amx_int8")):
+        return "int8"
+    return "int7" if able.get("avx2") else None
 
 
 def use_bf16(precision: str, device: str) -> bool:
@@ -44,28 +48,29 @@ def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
 
 
 def driving_precision(wanted: str, info: CheckpointInfo) -> str:
-    """fp32, bf16 or int8. `auto` is int8 where the network's ranges are known and the processor has VNNI, else what is
-    faster of the others.
+    """fp32, bf16, int8 or int7. `auto` is int8 or int7 where the network's ranges are known and the processor is fast
+    with integers, else what is faster of the others.
 
-    Raises ValueError for another word, and for int8 without ranges.
+    Raises ValueError for another word, and for integers without ranges.
     """
     if wanted not in PRECISIONS:
         raise ValueError(f"found precision {wanted!r}, wanted one of {', '.join(PRECISIONS)}: type --precision auto")
-    if wanted == "int8" and not info.ranges:
-        raise ValueError("found a network without the ranges that int8 needs: train it anew, or take fp32")
-    if wanted == "int8" or (wanted == "auto" and info.ranges and _int8_pays()):
-        return "int8"
-    return "bf16" if use_bf16(wanted, "cpu") else "fp32"
+    if wanted in INTEGERS:
+        if not info.ranges:
+            raise ValueError("found a network without the ranges that int8 needs: train it anew, or take fp32")
+        return wanted
+    fastest = _integers() if wanted == "auto" and info.ranges else None
+    return fastest or ("bf16" if use_bf16(wanted, "cpu") else "fp32")
 
 
 def features_in(precision: str, network: Network, info: CheckpointInfo) -> Features:
-    """The backbone in fp32, bf16 or int8 on the CPU; bf16 turns the network's own."""
-    if precision == "int8":
+    """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own."""
+    if precision in INTEGERS:
         from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which nothing else needs
 
         config = network.config
         size = config.image_height, config.image_width
-        return Int8Backbone(network.backbone, info.ranges, *size, torch.get_num_threads())
+        return Int8Backbone(network.backbone, info.ranges, *size, torch.get_num_threads(), int(precision[-1]))
     dtype = torch.bfloat16 if precision == "bf16" else torch.float32
     network.backbone.to(dtype)
     return lambda images: network.features(images.to(dtype)).float()
