@@ -25,6 +25,18 @@ def test_its_first_third_has_seen_every_cell() -> None:
     assert len({(one.condition, one.scenario.task) for one in suite("corl2017")[:400]}) == 16
 
 
+def test_corl2017_once_has_each_of_its_routes_in_one_weather_and_all_cells_from_the_start() -> None:
+    trials, whole = suite("corl2017-once"), suite("corl2017")
+    assert {one.key for one in trials} <= {one.key for one in whole}
+    routes = Counter((one.condition, one.scenario.task, one.key[-2:]) for one in trials)
+    assert len(routes) == 400
+    assert set(routes.values()) == {1}
+    assert len({(one.condition, one.scenario.task) for one in trials[:16]}) == 16
+    weathers = Counter(one.scenario.weather for one in trials if one.condition == "new town")
+    assert set(weathers) == {1, 3, 6, 8}
+    assert set(weathers.values()) <= {24, 28}
+
+
 def test_only_the_dynamic_task_has_others_on_the_road() -> None:
     traffic = {
         (one.scenario.town, one.scenario.task): (one.scenario.n_vehicles, one.scenario.n_pedestrians)

@@ -33,7 +33,7 @@ DENSITIES = {
 COLLISIONS = (InfractionKind.COLLISION_CAR, InfractionKind.COLLISION_OBJECT, InfractionKind.COLLISION_PERSON)
 OFFENCES = (*COLLISIONS, InfractionKind.RED_LIGHT, InfractionKind.OPPOSITE_LANE, InfractionKind.SIDEWALK)
 QUICK_ROUTES = 2
-SUITES = ("corl2017", "nocrash", "traffic-school", "quick")
+SUITES = ("corl2017", "corl2017-once", "nocrash", "traffic-school", "quick")
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,8 @@ def suite(name: str, seed: int = 0, time_limit: str = "paper") -> list[Trial]:
     """
     if name == "corl2017":
         return list(_corl2017(seed, time_limit, ROUTES_PER_TASK))
+    if name == "corl2017-once":
+        return _once(_corl2017(seed, time_limit, ROUTES_PER_TASK))
     if name == "quick":
         return [t for t in _corl2017(seed, time_limit, QUICK_ROUTES) if t.scenario.weather in (1, 14)]
     if name in ("nocrash", "traffic-school"):
@@ -85,6 +87,20 @@ def _corl2017(seed: int, time_limit: str, routes: int) -> Iterator[Trial]:
         for task in TASKS:
             for k, scenario in enumerate(scenarios(town, task, weather, seed=seed, time_limit=time_limit)[:routes]):
                 yield Trial(f"{town}-w{weather:02d}-{task}-{k:02d}", condition, scenario)
+
+
+def _route(trial: Trial) -> int:
+    return int(trial.key.rpartition("-")[2])
+
+
+def _once(trials: Iterator[Trial]) -> list[Trial]:
+    """Each route of each cell in one of its weathers, which take turns; the first of each cell before the second."""
+
+    def due(trial: Trial) -> bool:
+        weathers = CONDITIONS[trial.condition][1]
+        return trial.scenario.weather == weathers[_route(trial) % len(weathers)]
+
+    return sorted(filter(due, trials), key=_route)
 
 
 def _nocrash(seed: int, time_limit: str, fatal: tuple[InfractionKind, ...]) -> Iterator[Trial]:
