@@ -62,7 +62,8 @@ class BenchmarkSettings:
     """Drive a whole suite; what a folder holds already is kept, and the rest is driven."""
 
     suite: str = "quick"
-    """corl2017, corl2017-once (a third of it: each route in one weather), nocrash, traffic-school, quick, or a .json file with trials."""
+    """corl2017, corl2017-once (each of its routes in one weather only), nocrash, traffic-school, quick, or a .json
+    file with trials."""
     agent: str = "cal"
     """Who drives: cal sees the camera image only, oracle knows the truth."""
     model: Path | None = None
