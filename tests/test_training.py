@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_learns_where_the_column_stands(folder: Path, tmp_path: Path) -> None:
-    config = replace(SHORT, steps=150, batch=6, learning_rate=3e-3, save_every=1000, augment=False, balance=0.0)
+    config = replace(SHORT, steps=200, batch=6, learning_rate=2e-3, save_every=1000, augment=False, balance=0.0)
     network, info = load_network(train(config, folder, tmp_path, TINY, progress=False))
     assert info.metrics["center_distance/mae"] < 0.35  # the column wanders evenly over +-1 m: guessing 0 gives 0.5
     assert info.metrics["hazard_stop/iou"] > 0.6  # never seeing one gives 0.43
