@@ -93,7 +93,7 @@ def test_a_network_remembers_what_it_began_with_also_when_it_is_taken_up_without
     begun = replace(SHORT, initial=str(first))
     train(begun, folder, tmp_path / "second", TINY, progress=False, stop=lambda step: step == 4)
     done = train(SHORT, folder, tmp_path / "second", TINY, progress=False)
-    assert load_network(done)[1].training["initial"] == str(first)
+    assert load_network(done)[1].training["initial"] == first.name
 
 
 def test_a_killed_run_on_semantic_images_resumes_to_the_same_weights(tmp_path: Path) -> None:

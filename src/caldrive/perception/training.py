@@ -83,7 +83,8 @@ def validate(run: Run, held: Frames, model: Path, context: int) -> Row:
     found = evaluate(network, held, config.precision, run.team.device, context)
     seen = normalise(to_float(sampler.frames.images(sampler.draw(0, RANGED))))
     ranges = input_ranges(network.backbone, seen.to(run.team.device))
-    info = CheckpointInfo(network.config, summary(sampler.frames, held), found, asdict(config), config.seed, ranges)
+    told = asdict(config) | {"initial": config.initial and Path(config.initial).name}  # not whose folder
+    info = CheckpointInfo(network.config, summary(sampler.frames, held), found, told, config.seed, ranges)
     save_network(model, network, info, half=True)
     return {f"validation/{name}": value for name, value in found.items()}
 
