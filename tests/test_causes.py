@@ -59,6 +59,13 @@ def test_a_stop_that_flickers_is_one_and_short_ones_are_none() -> None:
     assert cause(trace(state="hazard stop", speed=lags)).what == "was too slow"
 
 
+def test_a_car_that_comes_back_to_its_lane_at_once_is_none_that_left_it() -> None:
+    wide = [0.0] * 200 + [1.5] * 25 + [0.0] * 375
+    assert cause(trace(true_center_distance=wide)).what == "was too slow"
+    stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
+    assert cause(trace(true_center_distance=wide, **stop)).what == "stood before no hazard"
+
+
 def test_what_came_first_counts() -> None:
     stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
     assert cause(trace(true_center_distance=after(250, 2.0), **stop)).what == "left its lane"

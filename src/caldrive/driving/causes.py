@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 Columns = Mapping[str, list[Any]]
 
-OFF_LANE = 1.3  # m from the centre line: a wheel is over the marking of a lane of 4 m
+OFF_LANE, ASTRAY = 1.3, 3.0  # m from the centre line, where a wheel is over the marking of a lane of 4 m, and s of it
 BEFORE = 2.0  # s in which what is seen leads to what happens
 STANDING = 0.3  # m/s
-NEEDLESS, FLICKER = 10.0, 3.0  # s of a stop for nothing that make a goal be missed, and of a pause within it
+NEEDLESS, FLICKER = 10.0, 3.0  # s of a stop for nothing that make a goal be missed, and of a pause within either
 GRID = 10.0  # m within which places are one
 
 
@@ -39,27 +40,31 @@ class Cause:
 
 def cause(trace: Columns) -> Cause:
     """How a missed goal began. trace: one value a step, by name (`Trace`)."""
-    off = np.flatnonzero(np.abs(trace["true_center_distance"]) > OFF_LANE)
-    found = [(int(off[0]), "left its lane")] if len(off) else []
-    for name, what in (("hazard_stop", "stood before no hazard"), ("red_light", "stood at no red light")):
-        at = _needless(trace, name)
-        found += [(at, what)] if at is not None else []
-    at, what = min(found, default=(len(trace["time"]) - 1, "was too slow"))
+    time = np.array(trace["time"])
+    starts = {
+        "left its lane": _lasting(time, np.abs(trace["true_center_distance"]) > OFF_LANE, ASTRAY),
+        "stood before no hazard": _lasting(time, _needless(trace, "hazard_stop"), NEEDLESS),
+        "stood at no red light": _lasting(time, _needless(trace, "red_light"), NEEDLESS),
+    }
+    found = [(at, what) for what, at in starts.items() if at is not None]
+    at, what = min(found, default=(len(time) - 1, "was too slow"))
     return Cause(what, trace["x"][at], trace["y"][at], trace["command"][at], _seen(trace, at, what))
 
 
-def _needless(trace: Columns, name: str) -> int | None:
-    """Where a stop for nothing begins that lasts too long; moments in which it is not seen do not end it."""
-    time = np.array(trace["time"])
-    stands = np.flatnonzero(
-        (np.array(trace["speed"]) < STANDING)
-        & (np.array(trace["state"]) == name.replace("_", " "))
-        & (np.array(trace[f"true_{name}"], dtype=float) < 0.5)
-    )
-    for stop in np.split(stands, np.flatnonzero(np.diff(time[stands]) > FLICKER) + 1):
-        if len(stop) and time[stop[-1]] - time[stop[0]] >= NEEDLESS:
-            return int(stop[0])
+def _lasting(time: NDArray[np.float64], true: NDArray[np.bool_], least: float) -> int | None:
+    """Where something begins that is true for so many s; moments in which it is not do not end it."""
+    steps = np.flatnonzero(true)
+    for run in np.split(steps, np.flatnonzero(np.diff(time[steps]) > FLICKER) + 1):
+        if len(run) and time[run[-1]] - time[run[0]] >= least:
+            return int(run[0])
     return None
+
+
+def _needless(trace: Columns, name: str) -> NDArray[np.bool_]:
+    """Whether the car stands, in each step, for what is not there."""
+    stands = np.array(trace["speed"]) < STANDING
+    says_so = np.array(trace["state"]) == name.replace("_", " ")
+    return np.asarray(stands & says_so & (np.array(trace[f"true_{name}"], dtype=float) < 0.5), dtype=np.bool_)
 
 
 def _seen(trace: Columns, at: int, what: str) -> str:
