@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from caldrive.config import CollectConfig
-from caldrive.datatypes import Control
+from caldrive.datatypes import Affordances, Control
 from caldrive.driving import collection
 from caldrive.driving.collection import BASELINES, _record, collect, episode_path
 from caldrive.episode_reader import Episode, read_episode
@@ -58,7 +58,8 @@ def test_every_moment_is_seen_by_three_cameras_at_their_baselines(episode: Episo
     frames = list(episode)
     assert {(frame.camera, frame.camera_left) for frame in frames} == set(enumerate(BASELINES))
     assert {frame.image.shape for frame in frames} == {(24, 48, 3)}
-    assert [frame.index for frame in frames if frame.camera == 1] == list(range(20))
+    left, middle, right = ([frame.index for frame in frames if frame.camera == camera] for camera in range(3))
+    assert left == middle == right == sorted(set(middle))
 
 
 def test_a_camera_keeps_its_yaw_which_is_15_degrees_at_most(unbroken: Path) -> None:
@@ -104,9 +105,13 @@ def test_the_cameras_see_different_pictures_that_change(episode: Episode) -> Non
     assert len(set(episode.jpegs)) > 50
 
 
+def standing_world() -> SimpleNamespace:
+    truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0, affordances=Affordances())
+    return SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
+
+
 def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
-    truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0)
-    world = SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
+    world = standing_world()
     told = []
     for index, _, telling in collection._moments(world, replace(TINY, duration=20.0)):  # type: ignore[arg-type]
         world.observation.speed = 5.0 if index >= 200 else 0.0
@@ -116,9 +121,16 @@ def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
     assert told[len(standing) :] == list(range(201, 401 - len(standing)))  # twenty seconds that tell something
 
 
+def test_a_light_that_changes_before_a_standing_car_tells_something() -> None:
+    world, told = standing_world(), []
+    for index, _, telling in collection._moments(world, replace(TINY, duration=10.0)):  # type: ignore[arg-type]
+        world.truth().affordances = Affordances(red_light=float(index < 60))
+        told += [index] if telling else []
+    assert told == [*range(17), *range(61, 77), *range(196, 200)]
+
+
 def test_an_episode_in_which_the_car_stands_on_ends() -> None:
-    truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0)
-    world = SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
+    world = standing_world()
     assert len(list(collection._moments(world, replace(TINY, duration=5.0)))) == 100  # type: ignore[arg-type]
 
 

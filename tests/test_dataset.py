@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from caldrive.datatypes import Control
 from caldrive.episodes import EpisodeError, EpisodeWriter
 from caldrive.perception.dataset import Frames
 from caldrive.perception.folders import find_episodes
@@ -69,3 +71,13 @@ def test_a_batch_may_ask_what_another_command_would(frames: Frames) -> None:
     batch = frames.batch(starts, 2, 3, np.array([True, True]))
     assert batch.command.tolist() == [[0, 0], [0, 0]]
     assert frames.batch(starts, 2, 3).command.tolist() == [[0, 0], [2, 2]]
+
+
+def test_a_frame_of_a_waiting_car_counts_less_than_one_of_a_car_that_may_go(tmp_path: Path) -> None:
+    with EpisodeWriter(tmp_path / "waits.parquet", SCENARIO) as writer:
+        for index in range(8):
+            clean = Control(brake=1.0) if index in (0, 1, 4, 5) else Control(throttle=0.5)
+            writer.append(replace(make_frame(index), speed=0.0 if index < 4 else 5.0, clean=clean))
+    frames = Frames(find_episodes(tmp_path), SIZE)
+    assert frames.rarity(0.5)[0] == pytest.approx(0.5 * frames.rarity(0.5)[2])  # it stands: for a reason, and without
+    assert frames.rarity(0.5)[4] == frames.rarity(0.5)[6]  # it drives, braking or not

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.datatypes import Control
-from caldrive.driving.disturbance import Disturbance
+from caldrive.driving.disturbance import Disturbance, LateStart
 
 controls = st.builds(
     lambda effort, steer: Control(max(effort, 0.0), max(-effort, 0.0), steer), st.floats(-1, 1), st.floats(-1, 1)
@@ -60,3 +60,32 @@ def test_a_wheel_that_stays_lets_the_car_turn_too_late() -> None:
         steers.append((wanted, disturbance.apply(Control(throttle=0.4, steer=wanted), 5.0).steer))
     assert (0.5, 0.0) in steers
     assert (0.0, 0.5) in steers
+
+
+def standing_times(seed: int) -> list[int]:
+    """Steps for which a driver stands on at each of two hundred lights that turned green."""
+    start, found = LateStart(np.random.default_rng(seed)), []
+    for _ in range(200):
+        speed, stood = 0.0, 0
+        for _ in range(20):  # red
+            assert start.apply(Control(brake=1.0), 0.0) == Control(brake=1.0)
+        while (control := start.apply(Control(throttle=0.5), speed)).throttle == 0:
+            stood += 1
+        while speed < 3:
+            assert control == Control(throttle=0.5)
+            speed += 0.2
+            control = start.apply(Control(throttle=0.5), speed)
+        found.append(stood)
+    return found
+
+
+def test_a_late_start_is_late_in_half_of_the_cases_and_2_s_at_most() -> None:
+    found = standing_times(5)
+    assert 80 < sum(stood > 0 for stood in found) < 120
+    assert {min(s for s in found if s), max(found)} <= set(range(5, 21))
+    assert found == standing_times(5)
+
+
+def test_a_car_on_its_way_is_never_held() -> None:
+    start = LateStart(np.random.default_rng(0))
+    assert {start.apply(Control(throttle=0.2), 0.4) for _ in range(500)} == {Control(throttle=0.2)}

@@ -20,7 +20,7 @@ from caldrive.config import CameraConfig, CollectConfig, ControlConfig, Longitud
 from caldrive.control.controller import Controller
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
-from caldrive.driving.disturbance import Disturbance
+from caldrive.driving.disturbance import Disturbance, LateStart
 from caldrive.driving.pool import spread
 from caldrive.driving.starts import starting_place
 from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
@@ -63,11 +63,11 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
         CameraConfig(config.width, config.height, left=left, yaw=float(yaw))
         for left, yaw in zip(BASELINES, yaws, strict=True)
     ]
-    disturbance, frames = Disturbance(rng), 0
+    disturbance, start, frames = Disturbance(rng), LateStart(rng), 0
     with EpisodeWriter(episode_path(folder, number), scenario) as writer:
         for index, observation, telling in _moments(world, config):
             clean = agent.act(observation)
-            driven = disturbance.apply(clean, observation.speed)
+            driven = start.apply(disturbance.apply(clean, observation.speed), observation.speed)
             if telling:
                 for frame in _frames(world, config, mounts, index, clean, driven):
                     writer.append(frame)
@@ -128,10 +128,13 @@ def _set_up(
 
 def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[tuple[int, Observation, bool]]:
     """Moments by number, and whether each tells something new, until enough of them did, patience or the route ends, or
-    the car touches something."""
-    wanted, told, stood = round(config.duration / world.dt), 0, 0
+    the car touches something. A car that stands tells the same until what it should stop for changes."""
+    wanted, told, stood, before = round(config.duration / world.dt), 0, 0, (0.0, 0.0)
     for index in range(PATIENCE * wanted):
-        stood = stood + 1 if world.observation.speed < STANDING else 0
+        labels = world.truth().affordances
+        reasons = labels.hazard_stop, labels.red_light
+        stood = stood + 1 if world.observation.speed < STANDING and reasons == before else 0
+        before = reasons
         telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
         told += telling
         yield index, world.observation, telling

@@ -1,4 +1,5 @@
-"""Short mishaps while recording: the steering and the speed go wrong, and the driver has to recover (section 3.1)."""
+"""Mishaps while recording: steering and speed go wrong for a moment, so that recoveries are seen (section 3.1), and the
+driver starts late."""
 
 from __future__ import annotations
 
@@ -33,3 +34,23 @@ class Disturbance:
         if self.rng.random() < 0.6:
             strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2)
             self.push = float(self.rng.choice([-1, 1]) * strength)
+
+
+class LateStart:
+    """A driver who dreams on for up to 2 s, in half of the cases, where a standing car may go. One that starts at once
+    stands before red lights only, and a network with a memory learns that whatever it stands before is red."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng, self.left, self.asked = rng, 0, False
+
+    def apply(self, control: Control, speed: float) -> Control:
+        """The control, or standing on."""
+        if speed > 1.0:
+            self.asked = False
+        elif speed < 0.1 and control.throttle > 0 and not self.asked:
+            self.asked = True
+            self.left = int(self.rng.integers(5, 21)) if self.rng.random() < 0.5 else 0
+        if self.left == 0:
+            return control
+        self.left -= 1
+        return Control(brake=1.0, steer=control.steer)

@@ -29,7 +29,7 @@ SIZES = {
     "clean_steer": (0.05, 0.15, 0.4),
 }
 NONE = -1  # number of the command that no frame has
-STANDING = 0.25  # weight of a frame in which the car stands: it looks like the one before
+WAITING = 0.25  # weight of a frame in which the car stands and has to: it looks like the one before
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,8 @@ class Frames:
         self.junction = np.concatenate([e.columns["junction"] for e in episodes])
         # Each command asks for one thing inside a junction, for another before it.
         self._manoeuvre = 2 * self.command + self.junction
-        self._standing = np.concatenate([e.columns["speed"] for e in episodes]) < 0.1
+        speed, throttle = (np.concatenate([e.columns[name] for e in episodes]) for name in ("speed", "clean_throttle"))
+        self._waiting = (speed < 0.1) & (throttle == 0)
         self.stream_start = self._stream_starts(episodes)
         lengths = [len(e) for e in episodes]
         self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
@@ -169,4 +170,4 @@ class Frames:
         numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self._manoeuvre, *self._sizes]
         frequencies = [(np.bincount(number) / len(self))[number] for number in numbers]
         rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
-        return (1 / rarest) ** balance * np.where(self._standing, STANDING**balance, 1.0)
+        return (1 / rarest) ** balance * np.where(self._waiting, WAITING**balance, 1.0)
