@@ -35,12 +35,18 @@ model: $(READY)
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
-# The suites for both agents and their reports in docs/results; a run that was stopped goes on.
+# The suites for both agents and their reports in docs/results; a run that was stopped goes on. An episode that one suite
+# shares with another is driven once.
 results: $(READY)
-	@for suite in corl2017 nocrash traffic-school; do \
-		for agent in oracle cal; do \
-			$(BIN)/caldrive benchmark --suite $$suite --agent $$agent --out $(RESULTS)/$$suite/$$agent $(ARGS); \
+	@for agent in oracle cal; do \
+		known=(); \
+		for suite in corl2017 nocrash traffic-school; do \
+			$(BIN)/caldrive benchmark --suite $$suite --agent $$agent --out $(RESULTS)/$$suite/$$agent "$${known[@]}" $(ARGS); \
+			known=(--known $(RESULTS)/corl2017/$$agent); \
+			[ $$suite = corl2017 ] || known+=($(RESULTS)/nocrash/$$agent); \
 		done; \
+	done
+	@for suite in corl2017 nocrash traffic-school; do \
 		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out docs/results/$$suite; \
 	done
 

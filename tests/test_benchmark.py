@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from caldrive.driving import benchmark as runner
-from caldrive.driving import ledger
+from caldrive.driving import ledger, worker
 from caldrive.driving.benchmark import benchmark, read_results
 from caldrive.driving.ledger import read_lines
 from caldrive.driving.settings import BenchmarkSettings
@@ -30,9 +30,9 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> BenchmarkSettings:
 
 @pytest.fixture(autouse=True)
 def _fresh() -> Iterator[None]:
-    runner._set_up.cache_clear()
+    worker._set_up.cache_clear()
     yield
-    runner._set_up.cache_clear()
+    worker._set_up.cache_clear()
     stop_sumo()
 
 
@@ -117,7 +117,7 @@ OURS = {"code": "1", "model": None, "precision": None}
 
 @pytest.mark.parametrize("name", ["code", "model", "precision"])
 def test_a_worker_that_drives_with_something_else_is_refused(name: str, tmp_path: Path) -> None:
-    drive = runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS | {name: "other"})
+    drive = worker.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS | {name: "other"})
     with pytest.raises(ValueError, match=f"worker with {name} other.*install the same caldrive and model"):
         runner._keep(tmp_path, drive, OURS)
     assert not list(tmp_path.iterdir())
@@ -126,6 +126,6 @@ def test_a_worker_that_drives_with_something_else_is_refused(name: str, tmp_path
 def test_files_are_there_before_their_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "append", lambda path, line: pytest.fail("was killed before the line"))
     with pytest.raises(pytest.fail.Exception):
-        runner._keep(tmp_path, runner.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS), OURS)
+        runner._keep(tmp_path, worker.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS), OURS)
     assert (tmp_path / "traces" / "a.json.gz").read_bytes() == b"x"
     assert read_lines(tmp_path / "results.jsonl") == {}

@@ -7,56 +7,20 @@ those of an unbroken one, in another order.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from caldrive.datatypes import Step
-from caldrive.driving.behaviour import Behaviour
 from caldrive.driving.cluster import spread_over_cluster
-from caldrive.driving.drivers import set_up
-from caldrive.driving.ledger import RESULTS, append, claim, makings, read_lines
+from caldrive.driving.ledger import RESULTS, append, claim, makings, read_lines, read_run
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.pool import spread
-from caldrive.driving.referee import Referee
-from caldrive.driving.rollout import run_episode
+from caldrive.driving.reuse import driven_elsewhere
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
 from caldrive.driving.suites import Driven, Trial, suite
-from caldrive.driving.trace import plain, result_from_values, result_values
-from caldrive.driving.witness import Witness
+from caldrive.driving.trace import result_from_values
+from caldrive.driving.worker import Drive, drive_trial
 from caldrive.files import write_whole
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What a worker sends back of a trial: its line, its files by their names, and what it drove with (`makings`)."""
-
-    line: dict[str, Any]
-    files: dict[str, bytes]
-    makings: dict[str, Any]
-
-
-@lru_cache(maxsize=1)
-def _set_up(driver: DriverSettings) -> Any:
-    """One world, agent and makings for each process."""
-    return *set_up(driver), makings(driver)
-
-
-def drive_trial(driver: DriverSettings, trial: Trial) -> Drive:
-    """Drives one trial."""
-    world, agent, made_with = _set_up(driver)
-    referee = Referee(trial.scenario, trial.fatal)
-    behaviour, witness = Behaviour(), Witness(world, referee)
-
-    def watch(step: Step) -> None:
-        behaviour.add(step)
-        witness.add(step)
-
-    result = run_episode(world, agent, trial.scenario, watch, referee)
-    figures = {name: plain(value) for name, value in behaviour.figures(result.infractions).items()}
-    line = {"key": trial.key, "result": result_values(result), "figures": figures}
-    return Drive(line, witness.files(trial.key, result), made_with)
 
 
 def read_results(settings: BenchmarkSettings) -> list[Driven]:
@@ -73,7 +37,7 @@ def read_results(settings: BenchmarkSettings) -> list[Driven]:
 def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     """Drives the trials that a folder lacks; yields how many are done, of how many, and whether the last one succeeded.
 
-    Raises ValueError where the folder belongs to another run, RuntimeError where workers keep dying or Ray is missing.
+    Raises ValueError where a folder belongs to another run, RuntimeError where workers keep dying or Ray is missing.
     """
     if settings.workers < 1:
         raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
@@ -83,13 +47,20 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     driver = DriverSettings(agent=settings.agent, model=model, preset=settings.preset, cap=cap)
     require_writable_folder(settings.out)
     claim(settings)
-    known, ours = read_lines(settings.out / RESULTS), makings(driver)
-    missing = [trial for trial in trials if trial.key not in known]
+    ours = makings(driver)
+    for drive in driven_elsewhere(settings.known, _missing(settings, trials), read_run(settings.out)):
+        _keep(settings.out, drive, ours)
+    missing = _missing(settings, trials)
     done = len(trials) - len(missing)
     for _, drive in _workers(settings, partial(drive_trial, driver), missing):
         _keep(settings.out, drive, ours)
         done += 1
         yield done, len(trials), drive.line["result"]["outcome"] == "success"
+
+
+def _missing(settings: BenchmarkSettings, trials: list[Trial]) -> list[Trial]:
+    known = read_lines(settings.out / RESULTS)
+    return [trial for trial in trials if trial.key not in known]
 
 
 def _workers(

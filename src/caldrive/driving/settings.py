@@ -70,6 +70,8 @@ class BenchmarkSettings:
     """The network of cal, a .safetensors file; without it the one in the package."""
     out: Path = Path("out/benchmark")
     """Folder for results.jsonl, a line an episode, and run.json, which says what drove."""
+    known: tuple[Path, ...] = ()
+    """Folders of other suites that the same agent drove; an episode that is among theirs is not driven again."""
     workers: int = 2
     """Processes that drive at the same time, here or with --ray local; a cluster uses all its processors."""
     ray: str | None = None

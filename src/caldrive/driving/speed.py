@@ -6,6 +6,7 @@ The world carries no timers of its own: here its parts' methods are wrapped, for
 from __future__ import annotations
 
 import math
+import os
 from collections import defaultdict
 from collections.abc import Callable
 from contextlib import closing
@@ -144,7 +145,7 @@ def measure_agent(settings: AgentSpeedSettings, progress: Progress = silent) -> 
         raise ValueError(f"found --steps {settings.steps}, wanted 1 or more: type --steps 300")
     from caldrive.driving.drivers import network_agent
 
-    agent, camera = network_agent(settings.model, ControlConfig(), settings.threads)
+    agent, camera = network_agent(settings.model, ControlConfig(), settings.threads or os.cpu_count() or 1)
     agent.reset()
     rng, took = np.random.default_rng(0), []
     for i in range(WARM_UP + settings.steps):

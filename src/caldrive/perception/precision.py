@@ -63,14 +63,16 @@ def driving_precision(wanted: str, info: CheckpointInfo) -> str:
     return fastest or ("bf16" if use_bf16(wanted, "cpu") else "fp32")
 
 
-def features_in(precision: str, network: Network, info: CheckpointInfo) -> Features:
-    """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own."""
+def features_in(precision: str, network: Network, info: CheckpointInfo, threads: int | None = None) -> Features:
+    """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own. threads: for integers, as many
+    as torch has without it."""
     if precision in INTEGERS:
         from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which nothing else needs
 
         config = network.config
         size = config.image_height, config.image_width
-        return Int8Backbone(network.backbone, info.ranges, *size, torch.get_num_threads(), int(precision[-1]))
+        threads = threads or torch.get_num_threads()
+        return Int8Backbone(network.backbone, info.ranges, *size, threads, int(precision[-1]))
     dtype = torch.bfloat16 if precision == "bf16" else torch.float32
     network.backbone.to(dtype)
     return lambda images: network.features(images.to(dtype)).float()

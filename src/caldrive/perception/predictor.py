@@ -12,7 +12,7 @@ from caldrive.datatypes import Affordances, Image, Observation
 from caldrive.perception.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import COMMANDS, Network
-from caldrive.perception.precision import driving_precision, features_in
+from caldrive.perception.precision import INTEGERS, driving_precision, features_in
 from caldrive.perception.specs import decode
 
 DARK = 3  # no pixel of a working camera's image is as dark as this, even by night
@@ -26,19 +26,19 @@ class NetworkPerception:
     """Perception by a trained network: keeps the features of the last `span` frames of an episode.
 
     Before the first frame there is the first frame again, as in training. precision: of the backbone,
-    see `driving_precision`; a network that is no file has no ranges. threads: how many it may use, None leaves that as
-    it is. Raises BadImage, and then forgets nothing.
+    see `driving_precision`; a network that is no file has no ranges. threads: how many it may use, None leaves torch's
+    as they are. Raises BadImage, and then forgets nothing.
     """
 
     def __init__(self, network: Network | Path | str, precision: str = "auto", threads: int | None = None) -> None:
-        if threads is not None:
-            torch.set_num_threads(threads)
         if isinstance(network, Network):
             network, info = network, CheckpointInfo(network.config)
         else:
             network, info = load_network(network)
-        self.network = network.eval()
-        self._features = features_in(driving_precision(precision, info), network, info)
+        self.network, precision = network.eval(), driving_precision(precision, info)
+        if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
+            torch.set_num_threads(1 if precision in INTEGERS else threads)
+        self._features = features_in(precision, network, info, threads)
         self._history: Tensor | None = None  # (1, span, F)
 
     def reset(self) -> None:

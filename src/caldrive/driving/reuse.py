@@ -1,0 +1,73 @@
+"""Episodes that another suite has driven already. NoCrash's empty and regular towns are the paper's navigation tasks,
+and a trial of the traffic school is one of NoCrash's that more infractions end."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from caldrive.datatypes import Scenario
+from caldrive.driving.ledger import RESULTS, read_lines, read_run
+from caldrive.driving.suites import Trial
+from caldrive.driving.trace import result_from_values
+from caldrive.driving.witness import still_paths, trace_path
+from caldrive.driving.worker import Drive
+from caldrive.results import EpisodeResult, Outcome
+
+DRIVEN_BY = ("agent", "cap", "preset", "code", "model", "precision")
+
+
+def driven_elsewhere(folders: Sequence[Path], trials: Sequence[Trial], wanted: dict[str, Any]) -> Iterator[Drive]:
+    """What driving would give, of those trials that are in other benchmarks' folders under any name.
+
+    wanted: what the folders' runs must have been driven by, at least `DRIVEN_BY`. Raises ValueError where they were
+    driven by something else.
+    """
+    left = {_nameless(trial.scenario): trial for trial in trials}
+    for folder in folders:
+        run = read_run(folder)
+        for name in DRIVEN_BY:
+            found = run.get(name)
+            if found != wanted[name]:
+                raise ValueError(
+                    f"found in {folder} episodes with {name} {found}, wanted {wanted[name]}: leave that --known out"
+                )
+        for line in read_lines(folder / RESULTS).values():
+            result = result_from_values(line["result"])
+            trial = left.get(_nameless(result.scenario))
+            if trial is not None and _ends_the_same(result, trial):
+                del left[_nameless(trial.scenario)]
+                yield Drive(_renamed(line, trial), _files(folder, line["key"], trial), wanted)
+
+
+def _nameless(scenario: Scenario) -> Scenario:
+    """What an episode depends on: all but its task's name."""
+    return replace(scenario, task="")
+
+
+def _ends_the_same(result: EpisodeResult, trial: Trial) -> bool:
+    """Whether the infractions that end the trial would have ended this episode where it ended."""
+    fatal = [k for k, one in enumerate(result.infractions) if one.kind in trial.fatal]
+    return fatal == ([len(result.infractions) - 1] if result.outcome is Outcome.FAILED else [])
+
+
+def _renamed(line: dict[str, Any], trial: Trial) -> dict[str, Any]:
+    return line | {"key": trial.key, "result": _with_task(line["result"], trial)}
+
+
+def _with_task(result: dict[str, Any], trial: Trial) -> dict[str, Any]:
+    return result | {"scenario": result["scenario"] | {"task": trial.scenario.task}}
+
+
+def _files(folder: Path, key: str, trial: Trial) -> dict[str, bytes]:
+    """The episode's trace and stills under their new names."""
+    values = json.loads(gzip.decompress(trace_path(folder, key).read_bytes()))
+    values["result"] = _with_task(values["result"], trial)
+    text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+    found = {str(trace_path(Path(), trial.key)): gzip.compress(text, mtime=0)}
+    stills = enumerate(still_paths(folder, key))
+    return found | {f"stills/{trial.key}-{k}.jpg": path.read_bytes() for k, path in stills}

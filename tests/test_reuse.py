@@ -1,0 +1,105 @@
+"""An episode that another suite drove is taken over as if it had been driven again, or it is driven again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from caldrive.driving import benchmark as runner
+from caldrive.driving import worker
+from caldrive.driving.benchmark import benchmark, read_results
+from caldrive.driving.reuse import driven_elsewhere
+from caldrive.driving.settings import BenchmarkSettings
+from caldrive.driving.suites import Trial, suite, to_json
+from caldrive.driving.trace import result_values
+from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
+from caldrive.world.traffic import stop_sumo
+
+RED, CAR = InfractionKind.RED_LIGHT, InfractionKind.COLLISION_CAR
+BY = {"agent": "oracle", "cap": 20.0, "preset": "default", "code": "1", "model": None, "precision": None}
+
+
+@pytest.fixture(autouse=True)
+def _fresh() -> Iterator[None]:
+    worker._set_up.cache_clear()
+    yield
+    worker._set_up.cache_clear()
+    stop_sumo()
+
+
+def short_suite(path: Path, task: str, fatal: tuple[InfractionKind, ...] = ()) -> str:
+    """Two trials of three seconds under a name."""
+    trials = [
+        Trial(f"{task}-{k}", "training", replace(one.scenario, time_limit=3.0, task=task), fatal)
+        for k, one in enumerate(suite("quick")[6:8])
+    ]
+    path.write_text(to_json(trials))
+    return str(path)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name != "run.json"}
+
+
+def test_what_is_taken_over_is_what_driving_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = BenchmarkSettings(short_suite(tmp_path / "a.json", "first"), "oracle", out=tmp_path / "first", workers=1)
+    list(benchmark(first))
+    other = replace(first, suite=short_suite(tmp_path / "b.json", "other", (RED,)), out=tmp_path / "other")
+    list(benchmark(other))
+    taken = replace(other, out=tmp_path / "taken", known=(tmp_path / "first",))
+    monkeypatch.setattr(runner, "drive_trial", lambda driver, trial: pytest.fail("drives"))
+    assert list(benchmark(taken)) == []
+    assert len(read_results(taken)) == 2
+    assert contents(taken.out) == contents(other.out)
+
+
+def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[InfractionKind, ...]) -> Path:
+    """A folder in which an episode ended so."""
+    broken = tuple(Infraction(kind, 1.0 + k, 0.0, 0.0) for k, kind in enumerate(kinds))
+    result = result_values(EpisodeResult(replace(trial.scenario, task="x"), outcome, 3.0, 1.0, 1.0, 9.0, broken, {}))
+    line: dict[str, Any] = {"key": "x-0", "result": result, "figures": {}}
+    (folder / "run.json").write_text(json.dumps(BY))
+    (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("outcome", "kinds", "fatal", "taken"),
+    [
+        (Outcome.SUCCESS, (), (RED, CAR), True),
+        (Outcome.SUCCESS, (RED,), (CAR,), True),
+        (Outcome.TIMEOUT, (RED, RED), (CAR,), True),
+        (Outcome.SUCCESS, (RED,), (RED, CAR), False),  # would have ended there
+        (Outcome.FAILED, (CAR,), (RED, CAR), True),
+        (Outcome.FAILED, (RED, CAR), (RED, CAR), False),  # would have ended before
+        (Outcome.FAILED, (RED,), (CAR,), False),  # would have gone on
+    ],
+)
+def test_an_episode_that_would_end_elsewhere_is_driven_again(
+    outcome: Outcome, kinds: Any, fatal: Any, taken: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial = replace(suite("quick")[0], fatal=fatal)
+    folder = known_folder(tmp_path, trial, outcome, kinds)
+    monkeypatch.setattr("caldrive.driving.reuse._files", lambda *_: {})
+    found = list(driven_elsewhere([folder], [trial], BY))
+    assert [one.line["key"] for one in found] == ([trial.key] if taken else [])
+
+
+def test_an_episode_of_other_traffic_is_driven(tmp_path: Path) -> None:
+    trial = suite("quick")[0]
+    folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
+    busier = replace(trial, scenario=replace(trial.scenario, n_vehicles=7))
+    assert list(driven_elsewhere([folder], [busier], BY)) == []
+
+
+@pytest.mark.parametrize(("name", "value"), [("code", "2"), ("agent", "cal"), ("cap", None), ("model", "3")])
+def test_episodes_driven_by_something_else_are_refused(name: str, value: object, tmp_path: Path) -> None:
+    trial = suite("quick")[0]
+    folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
+    with pytest.raises(ValueError, match=f"episodes with {name} .*leave that --known out"):
+        list(driven_elsewhere([folder], [trial], BY | {name: value}))
