@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,18 @@ def test_corl2017_has_25_routes_of_each_task_in_each_weather_of_each_condition()
     assert {n for (condition, _), n in counts.items() if "weather" not in condition} == {100}
     weathers = {(one.scenario.town, one.scenario.weather) for one in trials if one.condition == "new town + weather"}
     assert weathers == {("town02", 4), ("town02", 14)}
+
+
+def test_no_episode_is_another_one_under_another_sky() -> None:
+    for name, count in (("corl2017", 1200), ("nocrash", 900)):
+        both = [replace(one.scenario, weather=1, task="") for seed in (0, 1) for one in suite(name, seed)]
+        assert len(set(both)) == 2 * count
+
+
+def test_nocrash_shares_its_empty_and_regular_towns_with_the_papers_navigation() -> None:
+    known = {replace(one.scenario, task="") for one in suite("corl2017")}
+    shared = Counter(one.scenario.task for one in suite("nocrash") if replace(one.scenario, task="") in known)
+    assert shared == {"empty": 300, "regular": 300}
 
 
 def test_its_first_third_has_seen_every_cell() -> None:

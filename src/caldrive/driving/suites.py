@@ -82,10 +82,16 @@ def _by_weather() -> Iterator[tuple[str, str, int]]:
     yield from (one for each in rounds for one in each if one is not None)
 
 
+def _seed(seed: int, weather: int) -> int:
+    """Other traffic and other lights in each weather: a driver who does not look at the sky drives no episode twice."""
+    return 100 * seed + weather
+
+
 def _corl2017(seed: int, time_limit: str, routes: int) -> Iterator[Trial]:
     for condition, town, weather in _by_weather():
         for task in TASKS:
-            for k, scenario in enumerate(scenarios(town, task, weather, seed=seed, time_limit=time_limit)[:routes]):
+            found = scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)
+            for k, scenario in enumerate(found[:routes]):
                 yield Trial(f"{town}-w{weather:02d}-{task}-{k:02d}", condition, scenario)
 
 
@@ -108,8 +114,9 @@ def _nocrash(seed: int, time_limit: str, fatal: tuple[InfractionKind, ...]) -> I
         for density, traffic in DENSITIES.items():
             cars, people = traffic[town]
             found = scenarios(
-                town, "navigation", weather, cars=cars, people=people, seed=seed, time_limit=time_limit, name=density
-            )
+                town, "navigation", weather, cars=cars, people=people, seed=_seed(seed, weather), time_limit=time_limit,
+                name=density,
+            )  # fmt: skip
             for k, scenario in enumerate(found):
                 yield Trial(f"{town}-w{weather:02d}-{density}-{k:02d}", condition, scenario, fatal)
 
