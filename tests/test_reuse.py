@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -65,6 +66,8 @@ def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[Infr
     line: dict[str, Any] = {"key": "x-0", "result": result, "figures": {}}
     (folder / "run.json").write_text(json.dumps(BY))
     (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
+    (folder / "traces").mkdir()
+    (folder / "traces" / "x-0.json.gz").write_bytes(gzip.compress(json.dumps({"result": result}).encode()))
     return folder
 
 
@@ -81,13 +84,20 @@ def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[Infr
     ],
 )
 def test_an_episode_that_would_end_elsewhere_is_driven_again(
-    outcome: Outcome, kinds: Any, fatal: Any, taken: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    outcome: Outcome, kinds: Any, fatal: Any, taken: bool, tmp_path: Path
 ) -> None:
     trial = replace(suite("quick")[0], fatal=fatal)
     folder = known_folder(tmp_path, trial, outcome, kinds)
-    monkeypatch.setattr("caldrive.driving.reuse._files", lambda *_: {})
     found = list(driven_elsewhere([folder], [trial], BY))
     assert [one.line["key"] for one in found] == ([trial.key] if taken else [])
+
+
+def test_an_episode_without_its_trace_is_driven(tmp_path: Path) -> None:
+    trial = suite("quick")[0]
+    folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
+    assert len(list(driven_elsewhere([folder], [trial], BY))) == 1
+    (folder / "traces" / "x-0.json.gz").unlink()
+    assert list(driven_elsewhere([folder], [trial], BY)) == []
 
 
 def test_an_episode_of_other_traffic_is_driven(tmp_path: Path) -> None:

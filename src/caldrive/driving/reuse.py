@@ -39,7 +39,7 @@ def driven_elsewhere(folders: Sequence[Path], trials: Sequence[Trial], wanted: d
         for line in read_lines(folder / RESULTS).values():
             result = result_from_values(line["result"])
             trial = left.get(_nameless(result.scenario))
-            if trial is not None and _ends_the_same(result, trial):
+            if trial and _ends_the_same(result, trial) and trace_path(folder, line["key"]).is_file():
                 del left[_nameless(trial.scenario)]
                 yield Drive(_renamed(line, trial), _files(folder, line["key"], trial), wanted)
 
