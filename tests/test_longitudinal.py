@@ -163,6 +163,35 @@ def test_a_hazard_that_nobody_could_be_is_passed_at_a_walking_pace() -> None:
     assert results[-1].throttle > 0
 
 
+def test_a_light_that_is_red_for_longer_than_any_is_passed_at_a_walking_pace() -> None:
+    results = wait(65.0, DEFAULT_LAWS, red_light=0.95)
+    assert all(r.state is DriveState.RED_LIGHT and r.brake >= 0.8 for r in results[:599])
+    assert all(r.state is DriveState.CRUISING and r.target_speed == 4.0 for r in results[601:])
+    next_one = longitudinal_step(Affordances(), 3.0, STRAIGHT, 30.0, results[-1].memory, 0.1, DEFAULT_LAWS)
+    assert (next_one.memory.waited_red, next_one.target_speed) == (0.0, 30.0)
+
+
+def test_a_red_light_that_flickers_is_waited_for_no_longer() -> None:
+    memory = Memory()
+    for k in range(610):
+        seen = Affordances(red_light=0.3 if k % 50 == 49 else 0.9)
+        step = longitudinal_step(seen, 0.0, STRAIGHT, 30.0, memory, 0.1, DEFAULT_LAWS)
+        memory = step.memory
+    assert (step.state, step.target_speed) == (DriveState.RED_LIGHT, 0.0)  # for 1.2 of these 61 s it was not seen
+    for _ in range(30):
+        step = longitudinal_step(seen, 0.0, STRAIGHT, 30.0, memory, 0.1, DEFAULT_LAWS)
+        memory = step.memory
+    assert (step.state, step.target_speed) == (DriveState.CRUISING, 4.0)
+
+
+def test_a_moving_car_does_not_lose_its_patience() -> None:
+    memory = Memory()
+    for _ in range(900):
+        step = longitudinal_step(Affordances(red_light=0.9), 5.0, STRAIGHT, 30.0, memory, 0.1, DEFAULT_LAWS)
+        memory = step.memory
+    assert step.state is DriveState.RED_LIGHT
+
+
 def test_after_a_hazard_is_gone_the_next_one_is_waited_for_as_long() -> None:
     before = wait(20.0, DEFAULT_LAWS, hazard_stop=0.95)[-1]
     gone = longitudinal_step(Affordances(), 3.0, STRAIGHT, 30.0, before.memory, 0.1, DEFAULT_LAWS)
@@ -175,14 +204,18 @@ def test_after_a_hazard_is_gone_the_next_one_is_waited_for_as_long() -> None:
     ("laws", "seen"),
     [
         (DEFAULT_LAWS, {"hazard_stop": 0.9, "vehicle_distance": 6.0}),
-        (DEFAULT_LAWS, {"hazard_stop": 0.9, "red_light": 0.9}),
         (PAPER_LAWS, {"hazard_stop": 0.9}),
+        (PAPER_LAWS, {"red_light": 0.95}),
     ],
 )
-def test_a_car_ahead_a_red_light_and_the_paper_wait_as_long_as_it_takes(
+def test_before_a_car_and_with_the_papers_laws_it_waits_as_long_as_it_takes(
     laws: LongitudinalConfig, seen: dict[str, float]
 ) -> None:
-    assert all(r.throttle == 0.0 for r in wait(60.0, laws, **seen))
+    assert all(r.throttle == 0.0 for r in wait(90.0, laws, **seen))
+
+
+def test_a_red_light_holds_a_car_that_has_lost_its_patience_with_a_hazard() -> None:
+    assert all(r.throttle == 0.0 for r in wait(59.0, DEFAULT_LAWS, hazard_stop=0.9, red_light=0.9))
 
 
 def test_a_moving_car_stops_for_a_hazard_however_long_it_is_seen() -> None:

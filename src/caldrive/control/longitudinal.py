@@ -20,11 +20,12 @@ CAR_AS_HAZARD = 15.0  # m; a car that is a hazard is nearer, unless its middle l
 @dataclass(frozen=True)
 class Memory:
     """What is carried from one step to the next: the last state, the PID of cruising or following, and the seconds
-    that the car has stood before a hazard that is no car."""
+    that the car has stood before a hazard that is no car, and before a red light."""
 
     state: DriveState = DriveState.CRUISING
     pid: PIDState = field(default_factory=PIDState)
     waited: float = 0.0
+    waited_red: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -71,15 +72,28 @@ def choose_state(affordances: Affordances, speed: float, target: float, config: 
     return DriveState.CRUISING
 
 
-def seconds_waited(
+def seconds_waited(seen: bool, waited: float, patience: float, standing: bool, dt: float) -> float:
+    """How long the car has stood before what it sees, or has crept on since it lost patience."""
+    return waited + dt if seen and (standing or waited >= patience) else 0.0
+
+
+def without_errors(
     affordances: Affordances, speed: float, memory: Memory, dt: float, config: LongitudinalConfig
-) -> float:
-    """How long the car has stood before a hazard that is no car, or has crept on since; speed in km/h."""
-    car = affordances.vehicle_distance < CAR_AS_HAZARD
-    if affordances.hazard_stop <= config.hazard_threshold or car:
-        return 0.0
-    waits = memory.waited >= config.hazard_patience or speed < config.hold_speed
-    return memory.waited + dt if waits else 0.0
+) -> tuple[Affordances, Memory]:
+    """What to stop for: not for a hazard that is no car nor for a red light, where they stay for longer than any does.
+    Returns the memory with the seconds waited, too; speed in km/h."""
+    standing = speed < config.hold_speed
+    hazard = affordances.hazard_stop > config.hazard_threshold and affordances.vehicle_distance >= CAR_AS_HAZARD
+    red = affordances.red_light > config.red_threshold
+    waited = seconds_waited(hazard, memory.waited, config.hazard_patience, standing, dt)
+    waited_red = memory.waited_red
+    if red or not standing:  # a light that flickers before a standing car is still the same
+        waited_red = seconds_waited(red, waited_red, config.red_patience, standing, dt)
+    if waited >= config.hazard_patience:
+        affordances = replace(affordances, hazard_stop=0.0)
+    if waited_red >= config.red_patience:
+        affordances = replace(affordances, red_light=0.0)
+    return affordances, replace(memory, waited=waited, waited_red=waited_red)
 
 
 def over_limit_brake(speed: float, target: float, safe: float, config: LongitudinalConfig) -> float:
@@ -130,10 +144,10 @@ def longitudinal_step(
     config: LongitudinalConfig,
 ) -> Longitudinal:
     """Throttle and brake for one step of dt seconds; speed and limit in km/h."""
-    target = cruise_target(limit, command, config)
-    waited = seconds_waited(affordances, speed, memory, dt, config)
-    if waited >= config.hazard_patience:
-        affordances, target = replace(affordances, hazard_stop=0.0), min(target, config.creep_speed)
+    target, seen = cruise_target(limit, command, config), affordances
+    affordances, memory = without_errors(seen, speed, memory, dt, config)
+    if affordances is not seen:
+        target = min(target, config.creep_speed)
     state = choose_state(affordances, speed, target, config)
     safe = target
     if affordances.vehicle_distance < config.follow_distance:
@@ -149,4 +163,4 @@ def longitudinal_step(
     else:
         target = safe
         effort, pid = pid_effort(state, speed, target, memory, dt, config)
-    return Longitudinal(max(effort, 0.0), max(-effort, 0.0), state, target, Memory(state, pid, waited))
+    return Longitudinal(max(effort, 0.0), max(-effort, 0.0), state, target, replace(memory, state=state, pid=pid))

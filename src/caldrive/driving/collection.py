@@ -117,7 +117,7 @@ def _set_up(
     hidden = rng.random() < config.hidden_cars
     oracle = (_HiddenCars if hidden else OraclePerception)(world.truth)
     # Whom no car is told of must not take one for nothing, however long it stands there.
-    laws = replace(LongitudinalConfig(), hazard_patience=math.inf)
+    laws = replace(LongitudinalConfig(), hazard_patience=math.inf, red_patience=math.inf)
     agent = CALAgent(oracle, Controller(ControlConfig(laws, cap=cap)))
     world.start(scenario, route)
     if rng.random() < config.displaced:
