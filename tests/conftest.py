@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from caldrive.driving import worker
 from caldrive.perception.dataset import Frames
 from caldrive.perception.folders import find_episodes
 from caldrive.world.camera import Camera
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import build_scenery
 from caldrive.world.towns import TOWNS, load_town
+from caldrive.world.traffic import stop_sumo
 from tests.perception_data import HEIGHT, WIDTH, record
 
 
@@ -30,6 +32,15 @@ def town02() -> RoadNetwork:
 def town(request: pytest.FixtureRequest) -> RoadNetwork:
     """Each of the package's towns."""
     return load_town(request.param)
+
+
+@pytest.fixture
+def fresh_worker() -> Iterator[None]:
+    """The test begins like a benchmark's new worker and leaves nothing running."""
+    worker._set_up.cache_clear()
+    yield
+    worker._set_up.cache_clear()
+    stop_sumo()
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +15,8 @@ from caldrive.driving.benchmark import benchmark, read_results
 from caldrive.driving.ledger import read_lines
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import suite, to_json
-from caldrive.world.traffic import stop_sumo
+
+pytestmark = pytest.mark.usefixtures("fresh_worker")
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +26,6 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> BenchmarkSettings:
     trials = [replace(one, scenario=replace(one.scenario, time_limit=3.0)) for one in suite("quick")[4:8]]
     (folder / "short.json").write_text(to_json(trials))
     return BenchmarkSettings(str(folder / "short.json"), "oracle", out=folder / "whole", workers=1)
-
-
-@pytest.fixture(autouse=True)
-def _fresh() -> Iterator[None]:
-    worker._set_up.cache_clear()
-    yield
-    worker._set_up.cache_clear()
-    stop_sumo()
 
 
 @pytest.fixture(scope="module")

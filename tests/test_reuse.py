@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,25 +11,16 @@ from typing import Any
 import pytest
 
 from caldrive.driving import benchmark as runner
-from caldrive.driving import worker
 from caldrive.driving.benchmark import benchmark, read_results
 from caldrive.driving.reuse import driven_elsewhere
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import Trial, suite, to_json
 from caldrive.driving.trace import result_values
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
-from caldrive.world.traffic import stop_sumo
 
+pytestmark = pytest.mark.usefixtures("fresh_worker")
 RED, CAR = InfractionKind.RED_LIGHT, InfractionKind.COLLISION_CAR
 BY = {"agent": "oracle", "cap": 20.0, "preset": "default", "code": "1", "model": None, "precision": None}
-
-
-@pytest.fixture(autouse=True)
-def _fresh() -> Iterator[None]:
-    worker._set_up.cache_clear()
-    yield
-    worker._set_up.cache_clear()
-    stop_sumo()
 
 
 def short_suite(path: Path, task: str, fatal: tuple[InfractionKind, ...] = ()) -> str:

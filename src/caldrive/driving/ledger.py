@@ -18,6 +18,7 @@ from typing import Any
 from caldrive.driving.drivers import model_path
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
 from caldrive.driving.suites import SUITES
+from caldrive.driving.trace import json_line
 from caldrive.files import write_whole
 
 PACKAGE = Path(__file__).parents[1]
@@ -115,6 +116,6 @@ def append(path: Path, values: dict[str, Any]) -> None:
     with path.open("ab+") as file:
         file.seek(0)
         file.truncate(file.read().rfind(b"\n") + 1)
-        file.write(json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n")
+        file.write(json_line(values))
         file.flush()
         os.fsync(file.fileno())

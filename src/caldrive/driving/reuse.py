@@ -13,7 +13,7 @@ from typing import Any
 from caldrive.datatypes import Scenario
 from caldrive.driving.ledger import RESULTS, read_lines, read_run
 from caldrive.driving.suites import Trial
-from caldrive.driving.trace import result_from_values
+from caldrive.driving.trace import json_line, result_from_values
 from caldrive.driving.witness import still_paths, trace_path
 from caldrive.driving.worker import Drive
 from caldrive.results import EpisodeResult, Outcome
@@ -67,7 +67,6 @@ def _files(folder: Path, key: str, trial: Trial) -> dict[str, bytes]:
     """The episode's trace and stills under their new names."""
     values = json.loads(gzip.decompress(trace_path(folder, key).read_bytes()))
     values["result"] = _with_task(values["result"], trial)
-    text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
-    found = {str(trace_path(Path(), trial.key)): gzip.compress(text, mtime=0)}
+    found = {str(trace_path(Path(), trial.key)): gzip.compress(json_line(values), mtime=0)}
     stills = enumerate(still_paths(folder, key))
     return found | {f"stills/{trial.key}-{k}.jpg": path.read_bytes() for k, path in stills}

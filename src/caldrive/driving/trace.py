@@ -81,7 +81,11 @@ def result_values(result: EpisodeResult) -> dict[str, Any]:
     }
 
 
+def json_line(values: dict[str, Any]) -> bytes:
+    """Values in JSON's types as one line."""
+    return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
 def episode_json(result: EpisodeResult, trace: Trace) -> bytes:
     """An episode's file."""
-    values = {"version": TRACE_VERSION, "result": result_values(result), "trace": trace.columns()}
-    return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+    return json_line({"version": TRACE_VERSION, "result": result_values(result), "trace": trace.columns()})
