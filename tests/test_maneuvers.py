@@ -150,8 +150,17 @@ MANEUVERS = [
         lambda run: min(run.gaps) > 4.0 and min(run.after(2).speeds) < 0.1 and abs(run.speeds[-1] - 15) < 1.0,
         seconds=40,
     ),
-    Maneuver("waits at a red light at 20 km/h", StraightRoad(speed=20, light=60), waits_at_red, cap=20),
-    Maneuver("stops at a red light from 30 km/h within the area", StraightRoad(speed=30, light=60), waits_at_red),
+    Maneuver("waits at a red light at 20 km/h", StraightRoad(speed=20, light=60), waits_at_red, cap=20, seconds=15),
+    Maneuver(
+        "stops at a red light from 30 km/h within the area", StraightRoad(speed=30, light=60), waits_at_red, seconds=15
+    ),
+    Maneuver(
+        "rolls on a little before a light that stays red, but not past it",
+        StraightRoad(speed=20, light=60),
+        lambda run: waits_at_red(run) and run.end.x > run.after(15.0).steps[0].truth.ego.pose.x + 1.0,
+        cap=20,
+        seconds=55,
+    ),
     Maneuver(
         "goes when the light turns green",
         StraightRoad(speed=30, light=60, green_at=15),

@@ -62,7 +62,7 @@ class PIDGains:
 
 @dataclass(frozen=True)
 class LongitudinalConfig:
-    """The five states' thresholds and laws. Speeds in km/h, distances in m, patience in s; see
+    """The five states' thresholds and laws. Speeds in km/h, distances in m, patience and red_roll in s; see
     control/presets.py for the reasons."""
 
     cruise: PIDGains = PIDGains(0.09, 0.02, 0.0, low=-0.3)
@@ -81,7 +81,8 @@ class LongitudinalConfig:
     red_floor: float = 0.8
     hazard_threshold: float = 0.4
     hazard_patience: float = 15.0
-    red_patience: float = 60.0
+    red_patience: float = 12.0
+    red_roll: float = 1.2
     creep_speed: float = 4.0
     hold_speed: float = 1.0
     hold_brake: float = 0.3

@@ -80,8 +80,11 @@ def seconds_waited(seen: bool, waited: float, patience: float, standing: bool, d
 def without_errors(
     affordances: Affordances, speed: float, memory: Memory, dt: float, config: LongitudinalConfig
 ) -> tuple[Affordances, Memory]:
-    """What to stop for: not for a hazard that is no car nor for a red light, where they stay for longer than any does.
-    Returns the memory with the seconds waited, too; speed in km/h."""
+    """What to stop for: not for a hazard that is no car and stays for longer than any does; and before a light that
+    stays red for long the car rolls on a little, from where it may look otherwise, and waits anew.
+
+    Returns the memory with the seconds waited, too; speed in km/h.
+    """
     standing = speed < config.hold_speed
     hazard = affordances.hazard_stop > config.hazard_threshold and affordances.vehicle_distance >= CAR_AS_HAZARD
     red = affordances.red_light > config.red_threshold
@@ -89,6 +92,8 @@ def without_errors(
     waited_red = memory.waited_red
     if red or not standing:  # a light that flickers before a standing car is still the same
         waited_red = seconds_waited(red, waited_red, config.red_patience, standing, dt)
+    if waited_red >= config.red_patience + config.red_roll:
+        waited_red = 0.0
     if waited >= config.hazard_patience:
         affordances = replace(affordances, hazard_stop=0.0)
     if waited_red >= config.red_patience:
