@@ -211,3 +211,12 @@ def test_the_contact_sheet_shows_what_is_asked_for() -> None:
     looks = contact_sheet("town01", (64, 32), (1,), looks=2)
     first, second = looks[6 + 18 : 6 + 50].astype(int), looks[6 + 56 + 18 : 6 + 56 + 50]
     assert np.abs(first - second).mean() > 5
+
+
+def test_a_pixel_is_the_mean_of_what_lies_in_it(camera: Camera, approach: VehicleState) -> None:
+    small, large = (shot(camera, approach, mount=CameraConfig(200 * k, 88 * k)).astype(float) for k in (1, 8))
+    mean = large.reshape(88, 8, 200, 8, 3).mean(axis=(1, 3))
+    points = large[4::8, 4::8]  # what a camera without antialiasing would see
+    below = slice(54, None)  # kerbs and paint; further up, the large picture shows more detail
+    errors = [np.sqrt(((seen - mean)[below] ** 2).mean()) for seen in (small, points)]
+    assert errors[0] < 0.4 * errors[1]

@@ -167,8 +167,9 @@ def test_before_a_light_that_stays_red_the_car_rolls_on_a_little_and_waits_anew(
     results = wait(40.0, DEFAULT_LAWS, red_light=0.95)
     stands = [r.state is DriveState.RED_LIGHT and r.brake >= 0.8 for r in results]
     rolls = [r.state is DriveState.CRUISING and r.target_speed == 4.0 for r in results]
-    assert all(stands[:119]) and all(rolls[120:131]) and all(stands[133:251]) and all(rolls[254:263])
-    assert sum(rolls) == 3 * 12 and all(a != b for a, b in zip(stands, rolls, strict=True))
+    assert all(stands[:119] + rolls[120:131] + stands[133:251] + rolls[254:263])
+    assert all(a != b for a, b in zip(stands, rolls, strict=True))
+    assert sum(rolls) == 3 * 12
 
 
 def test_a_light_that_looks_green_from_further_on_is_passed() -> None:

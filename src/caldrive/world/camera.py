@@ -30,19 +30,16 @@ TOWN_FAR = 230.0  # m beyond which no more of the town is drawn
 PLACE = 8.0  # m, size of a place; from its next storey up, houses no longer hide what lies behind them
 CAR_DETAIL, PERSON_DETAIL = 22.0, 14.0  # m within which the fine meshes are drawn, for a small picture
 CAR_FAR, PERSON_FAR = 160.0, 80.0  # m beyond which nobody is drawn
+FINE = 2  # drawn so many times as large: drawn as they are, edges jump from pixel to pixel and thin things flicker
 SHARP = 100.0  # px, the focal length of a small picture (200 x 88 at 90 degrees)
 
 
 class Camera:
-    """Draws one town. decor: without it the town's own. samples: of antialiasing for pictures that people look at; it
-    more than doubles the time."""
+    """Draws one town. decor: without it the town's own."""
 
-    def __init__(
-        self, roads: RoadNetwork, scenery: tuple[Prop, ...], decor: Decor | None = None, samples: int = 0
-    ) -> None:
+    def __init__(self, roads: RoadNetwork, scenery: tuple[Prop, ...], decor: Decor | None = None) -> None:
         decor = decor or TOWNS[roads.style]
         gl, made, dome = gl_context(), programs(), dome_mesh()
-        self.samples = samples
         self._batches: tuple[TownBatch, ...] = town_batches(roads, scenery, decor)
         self._cars = [Crowd(make(shape)) for shape in SHAPES for make in (car_mesh, far_car_mesh)]
         self._people = [Crowd(person_mesh()), Crowd(far_person_mesh())]
@@ -82,7 +79,7 @@ class Camera:
         thrown = np.concatenate((cars.shadows, people.shadows))
         images = []
         for lens in lenses:
-            target, view = self._open(lens, self.samples, time), lens.view()
+            target, view = self._open(lens, FINE, time), lens.view()
             self._draw_solid(view, lens, cars, people)
             gl_context().disable(moderngl.CULL_FACE)
             self._dome.render()
@@ -103,17 +100,17 @@ class Camera:
         cars, people = car_actors(vehicles), person_actors(pedestrians)
         images = []
         for lens in (mounted(ego, mount) for mount in mounts):
-            target = self._open(lens, 0, 0.0)
+            target = self._open(lens, 1, 0.0)
             target.drawn.clear()  # sky is where nothing is drawn
             self._draw_solid(lens.view(), lens, cars, people, semantic=True)
             images.append(target.read()[..., 0])
         return images
 
-    def _open(self, lens: Lens, samples: int, time: float) -> Target:
+    def _open(self, lens: Lens, fine: int, time: float) -> Target:
         """An empty target that is drawn into from now on."""
-        if (lens.size, samples) not in self._targets:
-            self._targets[lens.size, samples] = Target(lens.size, samples)
-        target, gl, made = self._targets[lens.size, samples], gl_context(), programs()
+        if (lens.size, fine) not in self._targets:
+            self._targets[lens.size, fine] = Target(lens.size, fine)
+        target, gl, made = self._targets[lens.size, fine], gl_context(), programs()
         target.drawn.use()
         gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         gl.front_face, gl.depth_func = "cw", "<="  # pictures are drawn upside down

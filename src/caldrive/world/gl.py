@@ -109,20 +109,20 @@ def rain_drops() -> NDArray[np.uint8]:
 
 
 class Target:
-    """A picture to draw into and to read back. samples: of antialiasing, 0 for none."""
+    """A picture (width, height) to draw into and to read back. fine: it is drawn so many times as wide and as high, and
+    fine * fine pixels give one by their mean, as a lens does; 1 or 2."""
 
-    def __init__(self, size: tuple[int, int], samples: int = 0) -> None:
+    def __init__(self, size: tuple[int, int], fine: int = 1) -> None:
         gl = gl_context()
-        self.shape = (size[1], size[0], 3)
-        self.drawn = gl.framebuffer(
-            gl.renderbuffer(size, 4, samples=samples), gl.depth_renderbuffer(size, samples=samples)
-        )
-        self.resolved = gl.framebuffer(gl.renderbuffer(size, 4)) if samples else self.drawn
+        self.fine = fine
+        self.size = (size[0] * fine, size[1] * fine)
+        self.drawn = gl.framebuffer(gl.renderbuffer(self.size, 4), gl.depth_renderbuffer(self.size))
 
     def read(self) -> NDArray[np.uint8]:
         """The picture (H, W, 3); pictures are drawn upside down, so the first row read is the top one."""
-        if self.resolved is not self.drawn:
-            gl_context().copy_framebuffer(self.resolved, self.drawn)
-        picture = np.empty(self.shape, np.uint8)
-        self.resolved.read_into(picture, components=3, alignment=1)
-        return picture
+        picture = np.empty((self.size[1], self.size[0], 3), np.uint8)
+        self.drawn.read_into(picture, components=3, alignment=1)
+        if self.fine == 1:
+            return picture
+        pairs = picture[0::2].astype(np.uint16) + picture[1::2]
+        return ((pairs[:, 0::2] + pairs[:, 1::2] + 2) >> 2).astype(np.uint8)

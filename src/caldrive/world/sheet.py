@@ -64,7 +64,7 @@ def contact_sheet(
     sheet = Picture.new("RGB", (n_places * cell[0] + MARGIN, len(rows) * cell[1] + MARGIN), (24, 25, 27))
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
     for arrangement, members in groupby(enumerate(rows), lambda row: row[1][1]):
-        camera = Camera(roads, build_scenery(roads, arrangement), redecorated(roads.style, arrangement), samples=4)
+        camera = Camera(roads, build_scenery(roads, arrangement), redecorated(roads.style, arrangement))
         for row, (id, _) in members:
             for column, (name, picture) in enumerate(_views(camera, roads, id, size)):
                 x, y = MARGIN + column * cell[0], MARGIN + row * cell[1]
