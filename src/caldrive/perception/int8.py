@@ -7,7 +7,6 @@ convolution has one scale, found on recorded images (`calibration.input_ranges`)
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,12 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from caldrive.perception.backbone import Backbone
-
-# OpenVINO's converter, which nobody needs here, tells its makers over the network when it is imported; without it the
-# rest works.
-sys.modules.setdefault("openvino.tools.ovc", None)  # type: ignore[arg-type]
-import openvino as ov  # noqa: E402
-from openvino import opset13 as ops  # noqa: E402
+from caldrive.perception.graphs import compiled, constant, normalised, ops
 
 
 def _rounded(x: Any, top: Any, signed: bool, levels: int) -> Any:
@@ -37,24 +31,13 @@ def _convolution(x: Any, conv: nn.Module, top: float, signed: bool, bits: int) -
     weight = _rounded(ops.constant(np.ascontiguousarray(weight)), np.maximum(tops, 1e-9), True, 255)
     x = ops.convolution(_rounded(x, np.float32(top), signed, 256), weight, [1, 1], [1, 1], [1, 1], [1, 1])
     assert conv.bias is not None
-    return ops.add(x, ops.constant(conv.bias.detach().float().numpy().reshape(1, -1, 1, 1)))
+    return ops.add(x, constant(conv.bias, 1, -1, 1, 1))
 
 
-def _normalised(x: Any, norm: nn.Module) -> Any:
-    """Batch norm by its running statistics."""
-    if not isinstance(norm, nn.BatchNorm2d):
-        return x
-    assert norm.running_var is not None
-    assert norm.running_mean is not None
-    gain = (norm.weight / (norm.running_var + norm.eps).sqrt()).detach()
-    shift = (norm.bias - norm.running_mean * gain).detach()
-    gain, shift = (ops.constant(one.float().numpy().reshape(1, -1, 1, 1)) for one in (gain, shift))
-    return ops.add(ops.multiply(x, gain), shift)
-
-
-def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int, bits: int) -> ov.Model:
-    """The backbone as OpenVINO's graph; its fake quantizations become integers when it is compiled."""
-    image = x = ops.parameter([1, 3, height, width], np.float32)
+def _graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
+    """The backbone's features (1, F) of an image (1, 3, H, W); its fake quantizations become integers when it is
+    compiled."""
+    x = image
     number = 0
     for stage, norm in zip(backbone.stages, backbone.norms, strict=True):
         assert isinstance(stage, nn.ModuleList)
@@ -64,8 +47,8 @@ def _graph(backbone: Backbone, ranges: Sequence[float], height: int, width: int,
             x = _convolution(x, conv, ranges[number], signed=number == 0, bits=bits)
             number += 1
         x = ops.max_pool(x, [2, 2], [1, 1], [0, 0], [0, 0], [2, 2], "floor").output(0)
-        x = ops.relu(_normalised(x, norm))
-    return ov.Model([ops.reshape(x, ops.constant([1, -1]), False)], [image])
+        x = ops.relu(normalised(x, norm, 1, -1, 1, 1))
+    return ops.reshape(x, ops.constant([1, -1]), False)
 
 
 class Int8Backbone:
@@ -84,12 +67,8 @@ class Int8Backbone:
             )
         if not all(bool(torch.as_tensor(one).isfinite().all()) for one in (ranges, *backbone.state_dict().values())):
             raise ValueError("found weights that are not numbers, which integers would hide: train the network anew")
-        settings = {
-            "INFERENCE_NUM_THREADS": threads, "INFERENCE_PRECISION_HINT": "f32", "PERFORMANCE_HINT": "LATENCY",
-            "ENABLE_CPU_PINNING": False,
-        }  # fmt: skip
-        compiled = ov.Core().compile_model(_graph(backbone, ranges, height, width, bits), "CPU", settings)
-        self._request = compiled.create_infer_request()
+        image = ops.parameter([1, 3, height, width], np.float32)
+        self._request = compiled([_graph(image, backbone, ranges, bits)], image, threads)
 
     def __call__(self, images: Tensor) -> Tensor:
         """Normalised images (N, 3, H, W), which pass one at a time, to features (N, F)."""

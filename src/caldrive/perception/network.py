@@ -25,7 +25,7 @@ class _SafeBatchNorm(nn.BatchNorm1d):
         return super().forward(x)
 
 
-class _Group(nn.Module):
+class NodeGroup(nn.Module):
     """Task layer, batch norm, dropout and output nodes: (N, length, F) to (N, outputs)."""
 
     def __init__(self, config: BlockConfig, n_features: int, n_outputs: int) -> None:
@@ -69,13 +69,19 @@ class TaskBlock(nn.Module):
         self.config = config
         self.n_outputs = spec.outputs
         n_groups = len(COMMANDS) if spec.conditional else 1
-        self.groups = nn.ModuleList(_Group(config, n_features, spec.outputs) for _ in range(n_groups))
+        self.groups = nn.ModuleList(NodeGroup(config, n_features, spec.outputs) for _ in range(n_groups))
+
+    def group(self, command: int) -> NodeGroup:
+        """The nodes that a command, by its number, activates."""
+        chosen = self.groups[command if len(self.groups) > 1 else 0]
+        assert isinstance(chosen, NodeGroup)
+        return chosen
 
     def forward(self, features: Tensor, command: Tensor) -> Tensor:
         """Features (B, T, F) and the commands (B, S) of the last S frames to outputs (B * S, outputs)."""
         sequence, command = self._sequences(features, command.shape[1]), command.flatten()
         if len(self.groups) == 1 or len(command) == 1:  # at the wheel there is one frame and one command
-            result: Tensor = self.groups[int(command) if len(self.groups) > 1 else 0](sequence)
+            result: Tensor = self.group(int(command[0]))(sequence)
             return result
         outputs = sequence.new_zeros(len(sequence), self.n_outputs)
         for number, group in enumerate(self.groups):
@@ -119,6 +125,10 @@ class Network(nn.Module):
         """Normalised images (N, 3, H, W) to features (N, F)."""
         result: Tensor = self.backbone(images)
         return result
+
+    def task_blocks(self) -> dict[str, TaskBlock]:
+        """The blocks by their affordance."""
+        return {name: block for name, block in self.blocks.items() if isinstance(block, TaskBlock)}
 
     def forward(self, features: Tensor, command: Tensor) -> dict[str, Tensor]:
         """Features (B, T, F) and commands (B,) of the last frame, or (B, S) of the last S frames, to outputs (B * S,

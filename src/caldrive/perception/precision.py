@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -13,6 +13,8 @@ from caldrive.perception.checkpoint import CheckpointInfo
 from caldrive.perception.network import Network
 
 Features = Callable[[Tensor], Tensor]  # a backbone: normalised images (N, 3, H, W) to features (N, F)
+# The task blocks: features (1, span, F) and a command (1,) to outputs (1, K) by affordance.
+Blocks = Callable[[Tensor, Tensor], Mapping[str, Tensor]]
 INTEGERS = ("int8", "int7")  # int7: weights have 7 bits
 PRECISIONS = ("auto", "fp32", "bf16", *INTEGERS)
 
@@ -67,7 +69,7 @@ def features_in(precision: str, network: Network, info: CheckpointInfo, threads:
     """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own. threads: for integers, as many
     as torch has without it."""
     if precision in INTEGERS:
-        from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which nothing else needs
+        from caldrive.perception.int8 import Int8Backbone  # with OpenVINO, which only integers need
 
         config = network.config
         size = config.image_height, config.image_width
@@ -76,3 +78,14 @@ def features_in(precision: str, network: Network, info: CheckpointInfo, threads:
     dtype = torch.bfloat16 if precision == "bf16" else torch.float32
     network.backbone.to(dtype)
     return lambda images: network.features(images.to(dtype)).float()
+
+
+def blocks_in(precision: str, network: Network, threads: int | None = None) -> Blocks:
+    """The task blocks at the wheel: beside a backbone in integers they, too, pass OpenVINO, where it has their layers;
+    two libraries would wait for each other's threads."""
+    if precision in INTEGERS:
+        from caldrive.perception.block_graphs import LAYERS, BlockGraphs
+
+        if all(block.config.layer in LAYERS for block in network.task_blocks().values()):
+            return BlockGraphs(network, threads or torch.get_num_threads())
+    return network

@@ -12,7 +12,7 @@ from caldrive.datatypes import Affordances, Image, Observation
 from caldrive.perception.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import COMMANDS, Network
-from caldrive.perception.precision import INTEGERS, driving_precision, features_in
+from caldrive.perception.precision import INTEGERS, blocks_in, driving_precision, features_in
 from caldrive.perception.specs import decode
 
 DARK = 3  # no pixel of a working camera's image is as dark as this, even by night
@@ -39,6 +39,7 @@ class NetworkPerception:
         if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
             torch.set_num_threads(1 if precision in INTEGERS else threads)
         self._features = features_in(precision, network, info, threads)
+        self._blocks = blocks_in(precision, network, threads)
         self._history: Tensor | None = None  # (1, span, F)
 
     def reset(self) -> None:
@@ -57,7 +58,7 @@ class NetworkPerception:
         else:
             self._history = torch.cat((self._history[:, 1:], feature), dim=1)
         command = torch.tensor([COMMANDS.index(observation.command)])
-        return decode(self.network(self._history, command))
+        return decode(self._blocks(self._history, command))
 
     def _check(self, image: Image) -> None:
         config = self.network.config
