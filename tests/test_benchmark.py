@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from dataclasses import replace
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ from caldrive.driving.benchmark import benchmark, read_results
 from caldrive.driving.ledger import read_lines
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import suite, to_json
+from caldrive.driving.witness import read_trace, trace_path
 
 pytestmark = pytest.mark.usefixtures("fresh_worker")
 
@@ -86,15 +88,28 @@ def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, mo
         next(benchmark(whole))
 
 
-def test_damaged_files_are_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
-    out = replace(whole, out=tmp_path)
-    next(benchmark(out))
-    (tmp_path / "results.jsonl").write_bytes(b"nonsense\n")
+@pytest.mark.parametrize(
+    "line", ["nonsense", "3", '{"key": "a"}', '{"key": "a", "result": 3, "figures": {}}', '{"key": NaN}'], ids=str
+)
+def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").write_text(line + "\n")
     with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
-        next(benchmark(out))
-    (tmp_path / "run.json").write_text("[1")
+        next(benchmark(replace(whole, out=tmp_path)))
+
+
+@pytest.mark.parametrize("text", ["[1", "[]", "{}", '{"suite": 3}'])
+def test_a_damaged_description_is_named(text: str, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text(text)
     with pytest.raises(ValueError, match=r"run\.json is damaged"):
-        next(benchmark(out))
+        ledger.read_run(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"garbage", gzip.compress(b"{"), gzip.compress(b'{"trace": 3}')], ids=range(3))
+def test_a_damaged_trace_is_named(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "traces").mkdir()
+    trace_path(tmp_path, "a").write_bytes(content)
+    with pytest.raises(ValueError, match=r"damaged trace .*a\.json\.gz"):
+        read_trace(tmp_path, "a")
 
 
 def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:

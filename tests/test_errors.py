@@ -39,6 +39,10 @@ MISTAKES = {
     "sheet of no kind": (["town", "--sheet", "{tmp}/town.jpg"], "wanted a name that ends in .png"),
     "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384 pixels"),
     "sheet of too many looks": (["town", "--sheet", "{tmp}/town.png", "--looks", "-1"], "wanted 0 to 100"),
+    "no step to learn": (["train", "--steps", "0", "--out", "{tmp}"], "type --steps 1000"),
+    "a rate of nothing": (["train", "--rate", "0", "--out", "{tmp}"], "type --rate 4e-4"),
+    "a cap below nothing, in a suite": (["benchmark", "--cap", "-5", "--out", "{tmp}"], "type --cap 20"),
+    "a cap that is no number, in a suite": (["benchmark", "--cap", "nan", "--out", "{tmp}"], "type --cap 20"),
     "sheet in a folder's place": (["town", "--sheet", "{tmp}/folder.png"], "is a folder"),
 }
 

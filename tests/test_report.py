@@ -116,7 +116,7 @@ def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
     (trial, *_) = suite("quick")
     old = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), {"jerk": 0.4})
     line = {"key": trial.key, "result": result_values(old), "figures": {}}
-    (tmp_path / "run.json").write_text(json.dumps(ABOUT | {"seed": 0, "time_limit": "paper"}))
+    (tmp_path / "run.json").write_text(json.dumps(ABOUT | {"seed": 0, "time_limit": "paper", "preset": "default"}))
     (tmp_path / "results.jsonl").write_text(json.dumps(line) + "\n")
     with pytest.raises(ValueError, match="older caldrive"):
         load_run(tmp_path)

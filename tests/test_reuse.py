@@ -21,6 +21,7 @@ from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 pytestmark = pytest.mark.usefixtures("fresh_worker")
 RED, CAR = InfractionKind.RED_LIGHT, InfractionKind.COLLISION_CAR
 BY = {"agent": "oracle", "cap": 20.0, "preset": "default", "code": "1", "model": None, "precision": None}
+RUN = BY | {"suite": "x", "time_limit": "paper", "seed": 0}
 
 
 def short_suite(path: Path, task: str, fatal: tuple[InfractionKind, ...] = ()) -> str:
@@ -54,10 +55,10 @@ def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[Infr
     broken = tuple(Infraction(kind, 1.0 + k, 0.0, 0.0) for k, kind in enumerate(kinds))
     result = result_values(EpisodeResult(replace(trial.scenario, task="x"), outcome, 3.0, 1.0, 1.0, 9.0, broken, {}))
     line: dict[str, Any] = {"key": "x-0", "result": result, "figures": {}}
-    (folder / "run.json").write_text(json.dumps(BY))
+    (folder / "run.json").write_text(json.dumps(RUN))
     (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
     (folder / "traces").mkdir()
-    (folder / "traces" / "x-0.json.gz").write_bytes(gzip.compress(json.dumps({"result": result}).encode()))
+    (folder / "traces" / "x-0.json.gz").write_bytes(gzip.compress(json.dumps({"result": result, "trace": {}}).encode()))
     return folder
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import tyro
 
 from caldrive.commands.answer import Answer, Output
+from caldrive.config import PERCEPTIONS, TRAININGS, CollectConfig, TrainingConfig
 from caldrive.driving.settings import CollectSettings, DataSettings, EvaluateSettings, Progress, TrainSettings
 
 
 @dataclass(frozen=True)
 class Collect(CollectSettings, Output):
     def run(self, progress: Progress) -> Answer:
-        from caldrive.config import CollectConfig
         from caldrive.driving.collection import collect
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.driving.tables import counts_table
@@ -51,10 +51,21 @@ class Data(DataSettings, Output):
 
 @dataclass(frozen=True)
 class Train(TrainSettings, Output):
-    def run(self, progress: Progress) -> Answer:
-        from dataclasses import replace
+    def _config(self) -> TrainingConfig:
+        if self.preset not in TRAININGS:
+            raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
+        if self.steps is not None and self.steps < 1:
+            raise ValueError(f"found --steps {self.steps}, wanted at least 1: type --steps 1000")
+        if self.rate is not None and not 0 < self.rate < 1:
+            raise ValueError(f"found --rate {self.rate}, wanted more than 0 and less than 1: type --rate 4e-4")
+        config = TRAININGS[self.preset]
+        return replace(
+            config, seed=self.seed, device=self.device, initial=str(self.initial) if self.initial else None,
+            steps=config.steps if self.steps is None else self.steps,
+            learning_rate=config.learning_rate if self.rate is None else self.rate,
+        )  # fmt: skip
 
-        from caldrive.config import PERCEPTIONS, TRAININGS
+    def run(self, progress: Progress) -> Answer:
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.perception.backbone import imagenet_file
         from caldrive.perception.memory import keep_memory
@@ -62,14 +73,7 @@ class Train(TrainSettings, Output):
 
         require_writable_folder(self.out)
         keep_memory()
-        if self.preset not in TRAININGS:
-            raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
-        config = TRAININGS[self.preset]
-        config = replace(
-            config, seed=self.seed, device=self.device, initial=str(self.initial) if self.initial else None,
-            steps=config.steps if self.steps is None else self.steps,
-            learning_rate=config.learning_rate if self.rate is None else self.rate,
-        )  # fmt: skip
+        config = self._config()
         if self.initial and self.imagenet:
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
         wanted = PERCEPTIONS[self.preset].width == 1.0 and not self.initial

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.driving.cluster import spread_over_cluster
+from caldrive.driving.drivers import controller_config
 from caldrive.driving.ledger import RESULTS, append, claim, makings, read_lines, read_run
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.pool import spread
@@ -43,6 +44,7 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
         raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
     trials = suite(settings.suite, settings.seed, settings.time_limit)
     cap = None if settings.signs else settings.cap
+    controller_config(settings.preset, cap)  # refuses before the folder is claimed
     model = settings.model.resolve() if settings.model else None  # workers elsewhere stand in other folders
     driver = DriverSettings(agent=settings.agent, model=model, preset=settings.preset, cap=cap)
     require_writable_folder(settings.out)

@@ -18,11 +18,12 @@ from typing import Any
 from caldrive.driving.drivers import model_path
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
 from caldrive.driving.suites import SUITES
-from caldrive.driving.trace import json_line
+from caldrive.driving.trace import json_line, result_from_values
 from caldrive.files import write_whole
 
 PACKAGE = Path(__file__).parents[1]
 RESULTS, RUN = "results.jsonl", "run.json"
+SAID = {"suite": str, "agent": str, "cap": float | None, "preset": str, "time_limit": str, "seed": int, "code": str}
 
 
 @lru_cache(maxsize=1)
@@ -94,21 +95,36 @@ def read_run(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         raise ValueError(f"found no {RUN} in {folder}, wanted a benchmark's folder: type caldrive benchmark --out DIR")
     try:
-        return dict(json.loads(path.read_text()))
-    except (ValueError, TypeError) as error:
+        found = dict(json.loads(path.read_text()))
+        wrong = [name for name, kind in SAID.items() if not isinstance(found[name], kind)]
+    except (ValueError, TypeError, KeyError) as error:
+        wrong = [str(error)]
+    if wrong:
         raise ValueError(
-            f"found that {path} is damaged, wanted a run's description: type caldrive benchmark --out ANOTHER"
-        ) from error
+            f"found that {path} is damaged ({', '.join(wrong)}), wanted a run's description: "
+            "type caldrive benchmark --out ANOTHER"
+        )
+    return found
 
 
 def read_lines(path: Path) -> dict[str, dict[str, Any]]:
     """The lines of a results file by trial. One that was being written when the run was killed is no line."""
     lines = path.read_bytes().split(b"\n")[:-1] if path.is_file() else []
     try:
-        found = [json.loads(line) for line in lines]
-        return {str(one["key"]): one for one in found}
-    except (ValueError, KeyError, TypeError) as error:
+        return {one["key"]: one for one in map(_line, lines)}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"found a damaged line in {path} ({error}), wanted results: give another --out") from error
+
+
+def _line(text: bytes) -> dict[str, Any]:
+    """One line, which holds what results hold."""
+    found = dict(json.loads(text, parse_constant=_refuse))
+    result_from_values(found["result"])
+    return found | {"key": str(found["key"]), "figures": dict(found["figures"])}
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no number")
 
 
 def append(path: Path, values: dict[str, Any]) -> None:

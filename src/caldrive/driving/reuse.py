@@ -4,7 +4,6 @@ and a trial of the traffic school is one of NoCrash's that more infractions end.
 from __future__ import annotations
 
 import gzip
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from caldrive.datatypes import Scenario
 from caldrive.driving.ledger import RESULTS, read_lines, read_run
 from caldrive.driving.suites import Trial
 from caldrive.driving.trace import json_line, result_from_values
-from caldrive.driving.witness import still_paths, trace_path
+from caldrive.driving.witness import episode_values, still_paths, trace_path
 from caldrive.driving.worker import Drive
 from caldrive.results import EpisodeResult, Outcome
 
@@ -41,7 +40,7 @@ def driven_elsewhere(folders: Sequence[Path], trials: Sequence[Trial], wanted: d
             trial = left.get(_nameless(result.scenario))
             if trial and _ends_the_same(result, trial) and trace_path(folder, line["key"]).is_file():
                 del left[_nameless(trial.scenario)]
-                yield Drive(_renamed(line, trial), _files(folder, line["key"], trial), wanted)
+                yield Drive(_renamed(line, trial), _files(folder, line, trial), wanted)
 
 
 def _nameless(scenario: Scenario) -> Scenario:
@@ -63,10 +62,10 @@ def _with_task(result: dict[str, Any], trial: Trial) -> dict[str, Any]:
     return result | {"scenario": result["scenario"] | {"task": trial.scenario.task}}
 
 
-def _files(folder: Path, key: str, trial: Trial) -> dict[str, bytes]:
+def _files(folder: Path, line: dict[str, Any], trial: Trial) -> dict[str, bytes]:
     """The episode's trace and stills under their new names."""
-    values = json.loads(gzip.decompress(trace_path(folder, key).read_bytes()))
-    values["result"] = _with_task(values["result"], trial)
+    key = line["key"]
+    values = episode_values(trace_path(folder, key)) | {"result": _with_task(line["result"], trial)}
     found = {str(trace_path(Path(), trial.key)): gzip.compress(json_line(values), mtime=0)}
     stills = enumerate(still_paths(folder, key))
     return found | {f"stills/{trial.key}-{k}.jpg": path.read_bytes() for k, path in stills}

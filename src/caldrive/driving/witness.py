@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,18 @@ def trace_path(folder: Path, key: str) -> Path:
 
 
 def read_trace(folder: Path, key: str) -> dict[str, list[Any]] | None:
-    """The columns of an episode's trace, None where it left none."""
+    """The columns of an episode's trace, None where it left none. Raises ValueError where it is damaged."""
     path = trace_path(folder, key)
-    return dict(json.loads(gzip.decompress(path.read_bytes()))["trace"]) if path.is_file() else None
+    return dict(episode_values(path)["trace"]) if path.is_file() else None
+
+
+def episode_values(path: Path) -> dict[str, Any]:
+    """What a trace's file holds, `trace` at least. Raises ValueError where it is damaged."""
+    try:
+        found = dict(json.loads(gzip.decompress(path.read_bytes())))
+        return found | {"trace": dict(found["trace"])}
+    except (OSError, EOFError, zlib.error, ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"found a damaged trace {path} ({error}): remove it, then it is done without") from error
 
 
 def still_paths(folder: Path, key: str) -> list[Path]:
