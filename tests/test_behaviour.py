@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from caldrive.datatypes import Affordances, Control, Decision, DriveState, Observation, Pose, Step, Truth, VehicleState
-from caldrive.driving.behaviour import Behaviour
+from caldrive.driving.agent import NOTHING
+from caldrive.driving.behaviour import Behaviour, reds_obeyed
 from caldrive.results import Infraction, InfractionKind
 from tests.perception_data import column_image
 
@@ -30,11 +32,39 @@ def test_errors_are_means_over_the_episode_and_over_the_seconds_before_an_infrac
     assert figures["before/0/red_light"] == 0
 
 
-def test_each_red_light_is_met_once_and_time_off_the_lane_counts() -> None:
-    behaviour = Behaviour()
+def test_time_off_the_lane_counts() -> None:
+    behaviour, true = Behaviour(), Affordances()
     for k in range(60):
-        true = Affordances(red_light=float(k % 20 < 5))
         behaviour.add(step(k / 10, true, true, opposite=0.5 if k < 15 else 0.1))
+    assert behaviour.figures([])["off_lane"] == pytest.approx(0.25)
+
+
+APPROACH = [8.0, 6.0, 4.0, 2.0, 0.0, 0.0, 0.0, 0.0]  # m/s, to a stand
+AWAY = [2.0, 4.0, 6.0, 8.0, 8.0, 8.0, 8.0, 8.0]
+
+
+@pytest.mark.parametrize(
+    ("red", "speed", "run", "obeyed"),
+    [
+        ([1] * 8 + [0] * 8, APPROACH + AWAY, [], 1),
+        ([1, 1, 0, 1, 1, 0, 1, 1] + [0] * 8, APPROACH + AWAY, [], 1),  # it flickered
+        ([1, 1, 0, 0, 0, 0, 0, 0], AWAY, [], 0),  # passed on yellow
+        ([1] * 8 + [0] * 8, APPROACH + AWAY, [5.0], 0),  # it stood, and then it went
+        (([1] * 8 + [0] * 8) * 2, (APPROACH + AWAY) * 2, [], 2),
+        (([1] * 8 + [0] * 8) * 2, (APPROACH + AWAY) * 2, [13.0], 1),
+        ([0] * 8, [0.0] * 8, [], 0),
+    ],
+)
+def test_a_red_light_is_obeyed_where_the_car_stood_before_it_and_did_not_run_it(
+    red: list[int], speed: list[float], run: list[float], obeyed: int
+) -> None:
+    time = np.arange(len(red)) * 0.5
+    assert reds_obeyed(time, np.array(red, float), np.array(speed), run) == obeyed
+
+
+def test_a_blind_frame_is_no_right_answer() -> None:
+    behaviour, true = Behaviour(), Affordances(hazard_stop=1.0)
+    for k in range(10):
+        behaviour.add(step(k / 10, NOTHING if k < 5 else replace(true, hazard_stop=0.0), true))
     figures = behaviour.figures([])
-    assert figures["reds_met"] == 3
-    assert figures["off_lane"] == pytest.approx(0.25)
+    assert (figures["error/hazard_stop"], figures["error/relative_angle"]) == (1.0, 0.0)

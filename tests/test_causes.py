@@ -15,7 +15,7 @@ def trace(n: int = 600, **columns: Any) -> dict[str, list[Any]]:
         "time": np.arange(n) / 10, "x": np.arange(n) / 2, "y": 0.0, "speed": 5.0, "command": "straight",
         "state": "cruising", "true_center_distance": 0.0, "predicted_center_distance": 0.0, "true_relative_angle": 0.0,
         "predicted_relative_angle": 0.0, "true_hazard_stop": 0.0, "predicted_hazard_stop": 0.0, "true_red_light": 0.0,
-        "predicted_red_light": 0.0,
+        "predicted_red_light": 0.0, "true_vehicle_distance": 50.0, "predicted_vehicle_distance": 50.0,
     }  # fmt: skip
     return {name: np.broadcast_to(np.array(value), n).tolist() for name, value in (plain | columns).items()}
 

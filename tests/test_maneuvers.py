@@ -157,9 +157,15 @@ MANEUVERS = [
     Maneuver(
         "rolls on a little before a light that stays red, but not past it",
         StraightRoad(speed=20, light=60),
-        lambda run: waits_at_red(run) and run.end.x > run.after(15.0).steps[0].truth.ego.pose.x + 1.0,
+        lambda run: waits_at_red(run) and 0.8 < run.end.x - run.after(15.0).steps[0].truth.ego.pose.x < 1.2,
         cap=20,
-        seconds=55,
+        seconds=200,
+    ),
+    Maneuver(
+        "stays before a light that stays red for ever, however near it came to stand",
+        StraightRoad(speed=30, light=60),
+        waits_at_red,
+        seconds=200,
     ),
     Maneuver(
         "goes when the light turns green",

@@ -78,6 +78,15 @@ def test_a_share_counts_again_after_its_rest(kind: InfractionKind, name: str, th
 
 
 @pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
+def test_others_faults_hide_none_of_ones_own(
+    kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
+) -> None:
+    theirs, own = ((Contact(contact, "it", threshold + 1, at_fault=fault),) for fault in (False, True))
+    seen = watched([frame(0, contacts=theirs), frame(1, contacts=own), frame(2, contacts=theirs)])
+    assert [one.at_fault for one in seen.infractions] == [False, True]
+
+
+@pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
 def test_collisions_count_above_their_impulse_and_again_after_their_rest(
     kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
 ) -> None:

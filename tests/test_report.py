@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from caldrive.driving.report import Run, failures, load_run
+from caldrive.driving.report import Run, failures, load_run, load_runs
+from caldrive.driving.report_figures import _error_sums
 from caldrive.driving.report_page import report_page
 from caldrive.driving.report_tables import tables
 from caldrive.driving.report_text import report_text
@@ -28,14 +29,15 @@ from tests.test_causes import after, trace
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 ABOUT: dict[str, Any] = {
     "suite": "quick", "agent": "cal", "model": "abc", "cap": 20.0, "code": "123", "began": "2026-01-02T03:04:05+00:00",
-    "machine": "two cores",
+    "machine": "two cores", "seed": 0, "time_limit": "paper", "preset": "default", "model_file": None,
+    "suite_content": None, "precision": "int8",
 }  # fmt: skip
 COMFORT = {
     "center_distance": 0.05, "jerk": 0.4, "lateral_straight": 0.1, "lateral_turn": 0.2, "turning": 10.0,
     "comfortable": 0.9,
 }  # fmt: skip
 FIGURES: dict[str, Any] = {
-    "reds_met": 3, "off_lane": 0.0, "error/hazard_stop": 0.01, "error/red_light": 0.0,
+    "reds_obeyed": 3, "off_lane": 0.0, "error/hazard_stop": 0.01, "error/red_light": 0.0,
     "error/speed_sign": 0.02, "error/vehicle_distance": 0.5, "error/relative_angle": 0.02,
     "error/center_distance": 0.1, "before/0/relative_angle": 0.3, "before/0/hazard_stop": 0.5,
 }  # fmt: skip
@@ -87,9 +89,11 @@ def test_every_cell_stands_beside_the_papers(runs: list[Run]) -> None:
 
 def test_infractions_stand_beside_table_2(runs: list[Run]) -> None:
     found = next(one for one in tables(runs) if one.title == "Infractions")
-    row = next(r for r in found.rows if r[:2] == ("new weather", "opposite lane"))
-    assert row[2].startswith("> ")
+    row = next(r for r in found.rows if r[:3] == ("new weather", "navigation-dynamic", "opposite lane"))
+    assert row[3].startswith("> ")
     assert row[-1] == ">60"
+    row = next(r for r in found.rows if r[:3] == ("new weather", "all", "opposite lane"))
+    assert row[-4:] == ("", "", "", "")  # the paper counts in one task only
 
 
 def test_failures_say_what_was_wrong_before(runs: list[Run]) -> None:
@@ -107,6 +111,29 @@ def test_the_text_holds_all_tables_and_failures(runs: list[Run]) -> None:
     assert "caldrive benchmark --suite quick --agent cal --cap 20" in text
 
 
+def test_the_command_says_all_that_is_not_usual(runs: list[Run]) -> None:
+    about = {"seed": 3, "time_limit": "code", "preset": "paper", "cap": None, "model_file": "/a/b.safetensors"}
+    assert replace(runs[0], about=runs[0].about | about).command == (
+        "caldrive benchmark --suite quick --agent oracle --signs --preset paper --time-limit code --seed 3 "
+        "--model /a/b.safetensors --out DIR"
+    )
+
+
+def test_runs_of_one_agent_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    (trial, *_) = suite("quick")
+    result = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), COMFORT)
+    folders = [tmp_path / "a" / "cal", tmp_path / "b" / "cal"]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        (folder / "run.json").write_text(json.dumps(ABOUT))
+        line = {"key": trial.key, "result": result_values(result), "figures": FIGURES}
+        (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
+    assert [run.name for run in load_runs(folders)] == ["cal (a/cal)", "cal (b/cal)"]
+    assert [run.name for run in load_runs(folders[:1])] == ["cal"]
+    with pytest.raises(ValueError, match="a folder twice"):
+        load_runs([folders[0], folders[0] / ".." / "cal"])
+
+
 def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"no run\.json"):
         load_run(tmp_path)
@@ -116,7 +143,7 @@ def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
     (trial, *_) = suite("quick")
     old = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), {"jerk": 0.4})
     line = {"key": trial.key, "result": result_values(old), "figures": {}}
-    (tmp_path / "run.json").write_text(json.dumps(ABOUT | {"seed": 0, "time_limit": "paper", "preset": "default"}))
+    (tmp_path / "run.json").write_text(json.dumps(ABOUT))
     (tmp_path / "results.jsonl").write_text(json.dumps(line) + "\n")
     with pytest.raises(ValueError, match="older caldrive"):
         load_run(tmp_path)
@@ -124,6 +151,13 @@ def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
 
 def test_two_runs_write_the_same_page(runs: list[Run]) -> None:
     assert report_page(runs) == report_page(runs)
+
+
+def test_a_blind_frame_is_off_by_nothing_that_counts() -> None:
+    seen = trace(predicted_center_distance=[None] * 300 + [0.5] * 300)
+    count, wrong = _error_sums(seen, "center_distance")
+    assert (count.sum(), wrong.sum()) == (300, pytest.approx(150))
+    assert list(np.flatnonzero(count)) == [6, 7, 8, 9, 10, 11]  # from 30 s on, in slots of 5 s
 
 
 def test_what_comes_from_files_is_text_and_no_markup(runs: list[Run]) -> None:
@@ -184,7 +218,9 @@ def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[Run]) -> 
     page.select_option("select[data-filter=kind]", "sidewalk")
     shown = page.locator("article:visible")
     expected = [
-        one for one in failures(runs[1:]) if any(i.kind is InfractionKind.SIDEWALK for i in one.one.result.infractions)
+        one
+        for one in failures(runs[1:])
+        if any(i.kind is InfractionKind.SIDEWALK for i in one.episode.result.infractions)
     ]
     assert shown.count() == len(expected) > 0
     assert page.locator("#shown").inner_text() == str(len(expected))

@@ -21,7 +21,8 @@ from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 pytestmark = pytest.mark.usefixtures("fresh_worker")
 RED, CAR = InfractionKind.RED_LIGHT, InfractionKind.COLLISION_CAR
 BY = {"agent": "oracle", "cap": 20.0, "preset": "default", "code": "1", "model": None, "precision": None}
-RUN = BY | {"suite": "x", "time_limit": "paper", "seed": 0}
+SAID = {"suite": "x", "suite_content": None, "time_limit": "paper", "seed": 0, "model_file": None}
+RUN = BY | SAID | {"began": "2026-01-01T00:00:00", "machine": "a clock"}
 
 
 def short_suite(path: Path, task: str, fatal: tuple[InfractionKind, ...] = ()) -> str:

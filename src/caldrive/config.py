@@ -83,6 +83,7 @@ class LongitudinalConfig:
     hazard_patience: float = 15.0
     red_patience: float = 12.0
     red_roll: float = 1.2
+    red_rolls: int = 2
     creep_speed: float = 4.0
     hold_speed: float = 1.0
     hold_brake: float = 0.3
@@ -214,7 +215,7 @@ class TrainingConfig:
     """
 
     steps: int = 6_000
-    batch: int = 96
+    batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3
     warm_up: int = 100

@@ -19,13 +19,14 @@ CAR_AS_HAZARD = 15.0  # m; a car that is a hazard is nearer, unless its middle l
 
 @dataclass(frozen=True)
 class Memory:
-    """What is carried from one step to the next: the last state, the PID of cruising or following, and the seconds
-    that the car has stood before a hazard that is no car, and before a red light."""
+    """What is carried from one step to the next: the last state, the PID of cruising or following, the seconds that
+    the car has stood before a hazard that is no car, and before a red light, and how often it rolled on before it."""
 
     state: DriveState = DriveState.CRUISING
     pid: PIDState = field(default_factory=PIDState)
     waited: float = 0.0
     waited_red: float = 0.0
+    rolls: int = 0
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ def without_errors(
     affordances: Affordances, speed: float, memory: Memory, dt: float, config: LongitudinalConfig
 ) -> tuple[Affordances, Memory]:
     """What to stop for: not for a hazard that is no car and stays for longer than any does; and before a light that
-    stays red for long the car rolls on a little, from where it may look otherwise, and waits anew.
+    stays red for long the car rolls on a little, from where it may look otherwise, and waits anew; but so far only that
+    its front stays before the line.
 
     Returns the memory with the seconds waited, too; speed in km/h.
     """
@@ -92,13 +94,14 @@ def without_errors(
     waited_red = memory.waited_red
     if red or not standing:  # a light that flickers before a standing car is still the same
         waited_red = seconds_waited(red, waited_red, config.red_patience, standing, dt)
+    rolls = memory.rolls if red or standing else 0
     if waited_red >= config.red_patience + config.red_roll:
-        waited_red = 0.0
+        waited_red, rolls = 0.0, rolls + 1
     if waited >= config.hazard_patience:
         affordances = replace(affordances, hazard_stop=0.0)
-    if waited_red >= config.red_patience:
+    if waited_red >= config.red_patience and rolls < config.red_rolls:
         affordances = replace(affordances, red_light=0.0)
-    return affordances, replace(memory, waited=waited, waited_red=waited_red)
+    return affordances, replace(memory, waited=waited, waited_red=waited_red, rolls=rolls)
 
 
 def over_limit_brake(speed: float, target: float, safe: float, config: LongitudinalConfig) -> float:

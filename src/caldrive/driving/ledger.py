@@ -23,7 +23,11 @@ from caldrive.files import write_whole
 
 PACKAGE = Path(__file__).parents[1]
 RESULTS, RUN = "results.jsonl", "run.json"
-SAID = {"suite": str, "agent": str, "cap": float | None, "preset": str, "time_limit": str, "seed": int, "code": str}
+SAID = {
+    "suite": str, "suite_content": str | None, "agent": str, "cap": float | None, "preset": str, "time_limit": str,
+    "seed": int, "code": str, "model": str | None, "precision": str | None, "model_file": str | None, "began": str,
+    "machine": str,
+}  # fmt: skip
 
 
 @lru_cache(maxsize=1)

@@ -117,8 +117,8 @@ def rates(driven: Sequence[Driven]) -> list[Rate]:
 
 
 def comfort(driven: Sequence[Driven]) -> dict[str, float]:
-    """Figures of supplement 3.2 over all episodes, each weighted by its time: median centre-line distance in m, RMS
-    jerks in m/s³, share of time within nuPlan's bounds."""
+    """Figures of supplement 3.2 over all episodes: median of the episodes' median centre-line distances in m, and, each
+    episode weighted by its time, RMS jerks in m/s³ and the share of time within nuPlan's bounds."""
     drives = [(one.result.comfort, one.result.duration) for one in driven]
 
     def mean(name: str, power: int, weights: Iterable[float]) -> float:
@@ -136,10 +136,10 @@ def comfort(driven: Sequence[Driven]) -> dict[str, float]:
 
 
 def reds(driven: Sequence[Driven]) -> tuple[int, int]:
-    """Red lights met, and of these run. One that turned red as the car came to it is met when it is run."""
-    met = sum(int(one.figures["reds_met"]) for one in driven)
+    """Red lights that the car stopped for or ran, and those it ran."""
+    obeyed = sum(int(one.figures["reds_obeyed"]) for one in driven)
     run = sum(i.kind is InfractionKind.RED_LIGHT for one in driven for i in one.result.infractions)
-    return max(met, run), run
+    return obeyed + run, run
 
 
 def errors(driven: Sequence[Driven]) -> dict[str, float]:

@@ -70,7 +70,7 @@ class Referee:
         self.infractions: list[Infraction] = []
         self.outcome: Outcome | None = None
         self._frame = 0
-        self._counted: dict[InfractionKind, int] = {}  # frame of the last one of its kind
+        self._counted: dict[tuple[InfractionKind, bool], int] = {}  # frame of the last one of its kind and fault
         self._shares = {kind: deque[float](maxlen=RISE_FRAMES + 1) for kind in SHARE_RISE}
         self._last: Truth | None = None
         self._distance = 0.0
@@ -131,10 +131,10 @@ class Referee:
             self._count(InfractionKind.RED_LIGHT, truth)
 
     def _count(self, kind: InfractionKind, truth: Truth, at_fault: bool = True) -> None:
-        """One more infraction, unless one of its kind was counted a moment ago."""
-        if self._frame - self._counted.get(kind, -1000) <= REST_FRAMES[kind]:
+        """One more infraction, unless one of its kind and fault was counted a moment ago."""
+        if self._frame - self._counted.get((kind, at_fault), -1000) <= REST_FRAMES[kind]:
             return
-        self._counted[kind] = self._frame
+        self._counted[kind, at_fault] = self._frame
         self.infractions.append(Infraction(kind, truth.time, truth.ego.pose.x, truth.ego.pose.y, at_fault))
 
     def _note(self, truth: Truth) -> None:

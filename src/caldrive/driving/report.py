@@ -35,8 +35,13 @@ class Run:
     @property
     def command(self) -> str:
         """What to type for these results."""
-        pace = "--signs" if self.about["cap"] is None else f"--cap {self.about['cap']:g}"
-        return f"caldrive benchmark --suite {self.about['suite']} --agent {self.about['agent']} {pace} --out DIR"
+        about, usual = self.about, BenchmarkSettings()
+        words = [f"caldrive benchmark --suite {about['suite']} --agent {about['agent']}"]
+        words.append("--signs" if about["cap"] is None else f"--cap {about['cap']:g}")
+        given = {"--preset": "preset", "--time-limit": "time_limit", "--seed": "seed"}
+        words += [f"{word} {about[name]}" for word, name in given.items() if about[name] != getattr(usual, name)]
+        words += [f"--model {about['model_file']}"] if about.get("model_file") else []
+        return " ".join([*words, "--out DIR"])
 
 
 def load_run(folder: Path) -> Run:
@@ -48,16 +53,29 @@ def load_run(folder: Path) -> Run:
     driven = read_results(settings)
     if not driven:
         raise ValueError(f"found no episode in {folder}, wanted some: type caldrive benchmark --out {folder}")
-    if not all("turning" in one.result.comfort for one in driven):
+    if not all("turning" in one.result.comfort and "reds_obeyed" in one.figures for one in driven):
         raise ValueError(f"found results of an older caldrive in {folder}: type caldrive benchmark --out ANOTHER")
     return Run(about["agent"], folder, about, tuple(driven))
 
 
 def load_runs(folders: Sequence[Path]) -> list[Run]:
-    """All folders; runs of one agent are told apart by their folders' names."""
+    """All folders; runs of one agent are told apart by their folders. Raises ValueError for one that is given twice."""
+    if len({folder.resolve() for folder in folders}) < len(folders):
+        raise ValueError("found a folder twice, wanted each once: leave one of them out")
     runs = [load_run(folder) for folder in folders]
     names = [run.name for run in runs]
-    return [replace(run, name=f"{run.name} ({run.folder.name})") if names.count(run.name) > 1 else run for run in runs]
+    return [
+        replace(run, name=f"{run.name} ({_apart(run.folder, folders)})") if names.count(run.name) > 1 else run
+        for run in runs
+    ]
+
+
+def _apart(folder: Path, folders: Sequence[Path]) -> str:
+    """As much of a folder's path, from its end, as no other has."""
+    ends = [other.resolve().parts for other in folders if other.resolve() != folder.resolve()]
+    own = folder.resolve().parts
+    length = next(n for n in range(1, len(own) + 1) if all(end[-n:] != own[-n:] for end in ends))
+    return "/".join(own[-length:])
 
 
 def conditions(runs: Sequence[Run]) -> list[str]:
@@ -71,7 +89,7 @@ class Failure:
     before it; cause: how a missed goal began, where that is known."""
 
     run: str
-    one: Driven
+    episode: Driven
     before: tuple[str, ...]
     cause: Cause | None = None
 

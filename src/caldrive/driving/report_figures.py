@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from caldrive.config import KMH
 from caldrive.driving.measures import cells
@@ -23,7 +24,7 @@ from caldrive.world.towns import load_town
 COLORS = ("#1f4e79", "#c8782d", "#4f8a4c", "#8a4c86", "#777777")
 MARKS = dict(zip(SYSTEMS, "xv^D", strict=True))
 KIND_COLORS = dict(zip(InfractionKind, ("#e0a100", "#8a4c86", "#d9534f", "#444444", "#1f77b4", "#e377c2"), strict=True))
-BIN = 5.0  # s
+BIN, SLOTS = 5.0, 240  # s, and how many
 SHOWN = ("relative_angle", "center_distance", "vehicle_distance")
 
 
@@ -98,26 +99,27 @@ def traces(run: Run) -> Iterator[dict[str, list[Any]]]:
             yield columns
 
 
+def _error_sums(columns: dict[str, list[Any]], name: str) -> NDArray[np.float64]:
+    """How often a continuous affordance was seen in each slot of time, and the sum of what it was off by (2, SLOTS)."""
+    seen, true = (np.array(columns[f"{kind}_{name}"], dtype=float) for kind in ("predicted", "true"))
+    slot = np.minimum(np.array(columns["time"]) // BIN, SLOTS - 1).astype(int)
+    known = np.isfinite(seen)  # a blind car sees nothing
+    wrong = np.abs(seen - true)[known]
+    return np.stack([np.bincount(slot[known], weight, SLOTS) for weight in (np.ones_like(wrong), wrong)])
+
+
 def errors_figure(runs: Sequence[Run]) -> str:
     """Mean absolute error of the continuous affordances over the time since the start."""
     figure = Figure(figsize=(12, 3.2), layout="constrained")
     axes = figure.subplots(1, len(SHOWN))
     for k, run in enumerate(runs):
-        columns = list(traces(run))
-        time = np.concatenate([c["time"] for c in columns]) if columns else np.zeros(0)
-        slot = (time // BIN).astype(int)
-        for ax, name in zip(axes, SHOWN, strict=True):
-            if not columns or f"predicted_{name}" not in columns[0]:
-                continue
-            seen, true = (
-                np.concatenate([np.array(c[f"{kind}_{name}"], dtype=float) for c in columns])
-                for kind in ("predicted", "true")
-            )
-            wrong = np.nan_to_num(np.abs(seen - true))
-            count = np.bincount(slot)
-            mean = np.bincount(slot, wrong) / np.maximum(count, 1)
+        sums = np.zeros((len(SHOWN), 2, SLOTS))
+        for columns in traces(run):
+            sums += [_error_sums(columns, name) for name in SHOWN]
+        for ax, name, (count, wrong) in zip(axes, SHOWN, sums, strict=True):
             enough = count > 50
-            ax.plot((np.arange(len(mean)) * BIN)[enough], mean[enough], color=COLORS[k % len(COLORS)], label=run.name)
+            at = (np.arange(SLOTS) * BIN)[enough]
+            ax.plot(at, wrong[enough] / count[enough], color=COLORS[k % len(COLORS)], label=run.name)
             ax.set(title=name.replace("_", " "), xlabel="s since the start")
     for ax in axes:
         ax.set_ylim(bottom=0)

@@ -51,11 +51,11 @@ def _table(table: Table) -> str:
 
 def _failures(runs: Sequence[Run]) -> str:
     found, folders = failures(runs), {run.name: run.folder for run in runs}
-    kinds = sorted({i.kind.value for one in found for i in one.one.result.infractions})
+    kinds = sorted({i.kind.value for one in found for i in one.episode.result.infractions})
     choices = {
         "run": list(dict.fromkeys(one.run for one in found)),
-        "condition": list(dict.fromkeys(one.one.trial.condition for one in found)),
-        "task": list(dict.fromkeys(one.one.trial.scenario.task for one in found)),
+        "condition": list(dict.fromkeys(one.episode.trial.condition for one in found)),
+        "task": list(dict.fromkeys(one.episode.trial.scenario.task for one in found)),
         "kind": [*kinds, "goal missed"],
     }
     menus = "".join(
@@ -67,7 +67,7 @@ def _failures(runs: Sequence[Run]) -> str:
     left = MOST_STILLS
     cards = []
     for one in found:
-        stills = still_paths(folders[one.run], one.one.trial.key)[: max(0, left)]
+        stills = still_paths(folders[one.run], one.episode.trial.key)[: max(0, left)]
         left -= len(stills)
         cards.append(_card(one, stills))
     text = (
@@ -77,15 +77,14 @@ def _failures(runs: Sequence[Run]) -> str:
 
 
 def _card(failure: Failure, stills: Sequence[Path]) -> str:
-    one = failure.one
+    one = failure.episode
     broken = [
         f"<li>{escape(i.kind.value)} at {i.time:.1f} s{'' if i.at_fault else ', by others'}"
         f"<small>wrong in the 3 s before: {escape(before)}</small></li>"
         for i, before in zip(one.result.infractions, failure.before, strict=True)
     ]
-    kinds = {i.kind.value for i in one.result.infractions} | (
-        {"goal missed"} if one.result.outcome is not Outcome.SUCCESS else set()
-    )
+    kinds = sorted({i.kind.value for i in one.result.infractions})
+    kinds += ["goal missed"] if one.result.outcome is not Outcome.SUCCESS else []
     data = {
         "run": failure.run, "condition": one.trial.condition, "task": one.trial.scenario.task, "kind": "|".join(kinds)
     }  # fmt: skip

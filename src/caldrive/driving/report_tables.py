@@ -10,6 +10,9 @@ from caldrive.driving.causes import common_places
 from caldrive.driving.measures import cells, comfort, errors, rates, reds
 from caldrive.driving.published import COMFORT, SYSTEMS, km_between, success
 from caldrive.driving.report import UNITS, Run, conditions, failures
+from caldrive.driving.suites import Driven
+
+DYNAMIC, ALL = "navigation-dynamic", "all"  # tasks whose infractions are counted together
 
 
 @dataclass(frozen=True)
@@ -74,14 +77,25 @@ def _success(runs: Sequence[Run]) -> Table:
 def _infractions(runs: Sequence[Run]) -> Table:
     rows = []
     for condition in conditions(runs):
-        found = [rates(run.only(condition)) for run in runs]
-        for column in zip(*found, strict=True):
-            kind = column[0].kind
-            published = [km_between(system, condition, kind) for system in SYSTEMS]
-            rows.append((condition, kind.value, *(f"{rate.km_between} ({rate.count})" for rate in column), *published))
-    text = "Kilometres between two infractions and how many there were; > where there was none in so many kilometres."
-    head = ("condition", "infraction", *(run.name for run in runs), *(f"{system} (paper)" for system in SYSTEMS))
-    return Table("Infractions", text, head, tuple(rows))
+        for tasks in (DYNAMIC, ALL):
+            found = [rates([one for one in run.only(condition) if _among(one, tasks)]) for run in runs]
+            for column in zip(*found, strict=True) if any(rate[0].km for rate in found) else ():
+                kind = column[0].kind
+                published = [km_between(system, condition, kind) if tasks == DYNAMIC else "" for system in SYSTEMS]
+                ours = (f"{rate.km_between} ({rate.count})" for rate in column)
+                rows.append((condition, tasks, kind.value, *ours, *published))
+    text = (
+        "Kilometres between two infractions and how many there were; > where there was none in so many kilometres. "
+        "The benchmark counts infractions in navigation among others, where the paper's figures stand."
+    )
+    systems = (f"{system} (paper)" for system in SYSTEMS)
+    return Table(
+        "Infractions", text, ("condition", "tasks", "infraction", *(run.name for run in runs), *systems), tuple(rows)
+    )
+
+
+def _among(one: Driven, tasks: str) -> bool:
+    return tasks == ALL or one.trial.scenario.task == tasks
 
 
 def _lights(runs: Sequence[Run]) -> Table:
@@ -91,7 +105,7 @@ def _lights(runs: Sequence[Run]) -> Table:
             met, broken = reds(run.only(condition))
             share = f"{100 * (met - broken) / met:.1f}" if met else ""
             rows.append((condition, run.name, str(met), str(met - broken), share))
-    text = "Red lights that an agent came up to, and those it stopped for."
+    text = "Red lights that an agent stopped for or ran; those that turned green before it stood do not count."
     return Table("Red lights", text, ("condition", "agent", "met", "obeyed", "%"), tuple(rows))
 
 
@@ -130,7 +144,7 @@ def _causes(runs: Sequence[Run]) -> Table:
     found = failures(runs)
     for run in runs:
         for town in dict.fromkeys(one.trial.scenario.town for one in run.driven):
-            causes = [f.cause for f in found if f.run == run.name and f.one.trial.scenario.town == town and f.cause]
+            causes = [f.cause for f in found if f.run == run.name and f.episode.trial.scenario.town == town and f.cause]
             for (what, x, y, command), count in common_places(causes):
                 rows.append((run.name, Path(town).stem, what, f"({x}, {y})", command, str(count)))
     text = "What the car did wrong first in the episodes that missed their goal, and near which place."

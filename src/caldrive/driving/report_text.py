@@ -18,8 +18,8 @@ def report_text(runs: Sequence[Run]) -> str:
     head = ("agent", "episode", "outcome", "how it began", "infractions", "wrong in the 3 s before")
     parts += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for one in found:
-        broken = ", ".join(f"{i.kind.value} at {i.time:.1f} s" for i in one.one.result.infractions)
+        broken = ", ".join(f"{i.kind.value} at {i.time:.1f} s" for i in one.episode.result.infractions)
         before = "; ".join(one.before[:3])
-        cells = (one.run, one.one.trial.key, one.one.result.outcome.value, str(one.cause or ""), broken, before)
+        cells = (one.run, one.episode.trial.key, one.episode.result.outcome.value, str(one.cause or ""), broken, before)
         parts.append("| " + " | ".join(cells) + " |")
     return "\n".join(parts) + "\n"

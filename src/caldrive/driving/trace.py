@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from caldrive.config import KMH
-from caldrive.datatypes import Affordances, Step
+from caldrive.datatypes import Step
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import scenario_from_json, scenario_to_json
 
@@ -31,9 +31,10 @@ def _row(step: Step) -> dict[str, Any]:
     if decision is not None:
         row |= {"state": decision.state.value, "speed_limit": decision.speed_limit, "note": decision.note or None}
         row |= {"target_speed": decision.target_speed}
-    predicted: dict[str, Any] = asdict(decision.affordances if decision else Affordances())
-    row |= {f"predicted_{name}": value for name, value in predicted.items()}
-    return row | {f"true_{name}": value for name, value in asdict(step.truth.affordances).items()}
+    for name, value in asdict(step.truth.affordances).items():
+        row[f"predicted_{name}"] = getattr(decision.affordances, name) if decision is not None else None
+        row[f"true_{name}"] = value
+    return row
 
 
 class Trace:

@@ -1,4 +1,4 @@
-"""Keeps what the report shows of an episode: its trace, and a still of each infraction and of a failed end."""
+"""Keeps what the report shows of an episode: its trace, and a still of each infraction and of an end without goal."""
 
 from __future__ import annotations
 
@@ -62,8 +62,9 @@ class Witness:
 
     def files(self, key: str, result: EpisodeResult) -> dict[str, bytes]:
         """Trace and stills by their names in a benchmark's folder."""
-        if result.outcome is not Outcome.SUCCESS and len(self.stills) < MOST:
-            self.stills += self.world.images([STILL])
+        stills = list(self.stills)
+        if result.outcome in (Outcome.TIMEOUT, Outcome.ABORTED) and len(stills) < MOST:
+            stills += self.world.images([STILL])
         found = {str(trace_path(Path(), key)): gzip.compress(episode_json(result, self.trace), mtime=0)}
-        pictures = (simplejpeg.encode_jpeg(still, 85, colorspace="RGB") for still in self.stills)
+        pictures = (simplejpeg.encode_jpeg(still, 85, colorspace="RGB") for still in stills)
         return found | {f"stills/{key}-{k}.jpg": picture for k, picture in enumerate(pictures)}
