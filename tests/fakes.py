@@ -1,4 +1,4 @@
-"""A world in a few lines: one road, a scripted car ahead, a pedestrian, a light, signs; labels by the paper's areas."""
+"""A world in a few lines: one road, a scripted car ahead, a pedestrian, a light, signs; labelled as any world is."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from caldrive.config import KMH, VehicleConfig
 from caldrive.datatypes import (
-    Affordances,
     Command,
     Control,
     LightState,
@@ -24,13 +23,11 @@ from caldrive.datatypes import (
     Truth,
     VehicleState,
 )
-from caldrive.geometry import Polyline, box_corners, moved, to_local, wrap_angle
+from caldrive.geometry import Polyline, moved
+from caldrive.world.labels import label
 from caldrive.world.vehicle import EgoState, advance
 
 CAR = VehicleConfig()
-Area = tuple[float, float, float, float]
-Thing = Sign | TrafficLight | VehicleState | PedestrianState
-A1, A2, A3 = (7.4, 14.0, -5.8, -0.8), (0.0, 8.2, -2.0, 2.0), (0.0, 50.0, -1.6, 1.6)  # supplement 2, table 3
 POST_BEHIND_LINE = 6.6  # m from the stop line to the light's post: the bumper is there when the post leaves A1
 IMAGE = np.zeros((4, 4, 3), np.uint8)
 
@@ -102,10 +99,12 @@ class StraightRoad:
         people = (PedestrianState(Pose(*person, 0.0), on_road=True, id="person"),) if person else ()
         pose = moved(self.line.pose_at(self.lead(self.time)), forward=2.25) if self.lead else None
         cars = (VehicleState(pose, self.lead_speed * KMH, 4.5, 1.8, "lead"),) if pose else ()
+        ego = VehicleState(self.ego.pose, self.ego.speed, CAR.length, CAR.width, "ego")
+        signs = [Sign(self._post(s), limit) for s, limit in self.signs]
         return Truth(
             time=self.time,
-            ego=VehicleState(self.ego.pose, self.ego.speed, CAR.length, CAR.width, "ego"),
-            affordances=self._affordances(cars, people),
+            ego=ego,
+            affordances=label(ego, CAR.front_axle, self.line, None, cars, people, self._light(), signs),
             vehicles=cars,
             pedestrians=people,
             lights=self._light(),
@@ -113,31 +112,3 @@ class StraightRoad:
             route_length=self.line.length,
             goal_distance=math.hypot(self.ego.pose.x - self.goal.x, self.ego.pose.y - self.goal.y),
         )
-
-    def _affordances(self, cars: tuple[VehicleState, ...], people: tuple[PedestrianState, ...]) -> Affordances:
-        axle = moved(self.ego.pose, forward=CAR.front_axle)
-        there = self.line.project(axle.x, axle.y)
-        bumper = CAR.length / 2 - CAR.front_axle
-        bodies: tuple[Thing, ...] = (*cars, *people)
-        ahead = [
-            to_local(axle, box_corners(car.pose, car.length, car.width))[:, 0].min() - bumper
-            for car in cars
-            if self._seen(axle, car, A3)
-        ]
-        signs = [Sign(self._post(s), limit) for s, limit in self.signs]
-        return Affordances(
-            hazard_stop=float(any(self._seen(axle, body, A2) for body in bodies)),
-            red_light=float(
-                any(light.state is LightState.RED and self._seen(axle, light, A1) for light in self._light())
-            ),
-            speed_sign=next((sign.limit for sign in signs if self._seen(axle, sign, A1)), None),
-            vehicle_distance=float(np.clip(min(ahead, default=50.0), 0.0, 50.0)),
-            relative_angle=wrap_angle(there.heading - self.ego.pose.heading),
-            center_distance=float(np.clip(-there.left, -2.0, 2.0)),
-        )
-
-    @staticmethod
-    def _seen(axle: Pose, thing: Thing, area: Area) -> bool:
-        """Whether the thing's place lies in the area (x from, x to, y from, y to) ahead of the front axle."""
-        x, y = to_local(axle, np.array([thing.pose.x, thing.pose.y]))
-        return bool(area[0] <= x <= area[1] and area[2] <= y <= area[3])

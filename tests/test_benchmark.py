@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -76,7 +77,7 @@ def test_results_stand_in_the_suites_order(whole: BenchmarkSettings) -> None:
     assert all(one.figures["error/center_distance"] == 0 for one in found)  # the oracle's
 
 
-@pytest.mark.parametrize("change", [{"seed": 1}, {"signs": True}, {"cap": 30.0}, {"preset": "paper"}])
+@pytest.mark.parametrize("change", [{"signs": True}, {"cap": 30.0}, {"preset": "paper"}])
 def test_results_of_another_run_are_not_added_to(whole: BenchmarkSettings, change: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="give another --out"):
         next(benchmark(replace(whole, **change)))  # type: ignore[arg-type]
@@ -86,6 +87,29 @@ def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, mo
     monkeypatch.setattr(ledger, "code_version", lambda: "other")
     with pytest.raises(ValueError, match="with code"):
         next(benchmark(whole))
+
+
+def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    with ledger.held(tmp_path), pytest.raises(ValueError, match="another benchmark at work"):
+        next(benchmark(replace(whole, out=tmp_path)))
+
+
+def test_results_of_another_episode_of_the_same_name_are_refused(whole: BenchmarkSettings) -> None:
+    (trial, *_) = suite(whole.suite)
+    line = read_lines(whole.out / "results.jsonl")[trial.key]
+    other = replace(trial, scenario=replace(trial.scenario, seed=9))
+    assert runner.driven(trial, line).trial is trial
+    with pytest.raises(ValueError, match="another episode when it was driven"):
+        runner.driven(other, line)
+
+
+@pytest.mark.parametrize("change", [{"seed": 3}, {"time_limit": "code"}, {"seed": -1}])
+def test_what_a_suite_does_not_take_claims_no_folder(
+    change: dict[str, Any], whole: BenchmarkSettings, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match="found --seed"):
+        next(benchmark(replace(whole, out=tmp_path, **change)))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

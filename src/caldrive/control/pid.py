@@ -36,20 +36,3 @@ def pid_step(gains: PIDGains, state: PIDState, error: float, dt: float) -> tuple
     if (wanted - output) * error > 0:
         integral = state.integral
     return PIDState(integral, error, derivative), output
-
-
-class PID:
-    """A PID that keeps its own state between steps."""
-
-    def __init__(self, gains: PIDGains, dt: float) -> None:
-        self.gains, self.dt = gains, dt
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the past, as at the start of an episode."""
-        self.state = PIDState()
-
-    def step(self, error: float) -> float:
-        """The output for this error, within the limits of the gains."""
-        self.state, output = pid_step(self.gains, self.state, error, self.dt)
-        return output

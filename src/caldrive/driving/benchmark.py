@@ -13,26 +13,32 @@ from typing import Any
 
 from caldrive.driving.cluster import spread_over_cluster
 from caldrive.driving.drivers import controller_config
-from caldrive.driving.ledger import RESULTS, append, claim, makings, read_lines, read_run
+from caldrive.driving.ledger import RESULTS, append, claim, held, makings, read_lines, read_run
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.pool import spread
 from caldrive.driving.reuse import driven_elsewhere
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
-from caldrive.driving.suites import Driven, Trial, suite
+from caldrive.driving.suites import SUITES, Driven, Trial, suite
 from caldrive.driving.trace import result_from_values
 from caldrive.driving.worker import Drive, drive_trial
 from caldrive.files import write_whole
 
 
 def read_results(settings: BenchmarkSettings) -> list[Driven]:
-    """What a folder holds of a suite, in the suite's order."""
+    """What a folder holds of a suite, in the suite's order. Raises ValueError where it is of an older suite."""
     lines = read_lines(settings.out / RESULTS)
     trials = suite(settings.suite, settings.seed, settings.time_limit)
-    return [
-        Driven(trial, result_from_values(lines[trial.key]["result"]), lines[trial.key]["figures"])
-        for trial in trials
-        if trial.key in lines
-    ]
+    return [driven(trial, lines[trial.key]) for trial in trials if trial.key in lines]
+
+
+def driven(trial: Trial, line: dict[str, Any]) -> Driven:
+    """A trial and its line. Raises ValueError where the line is of an older suite's trial of this name."""
+    result = result_from_values(line["result"])
+    if result.scenario != trial.scenario:
+        raise ValueError(
+            f"found that {trial.key} was another episode when it was driven: type caldrive benchmark --out ANOTHER"
+        )
+    return Driven(trial, result, line["figures"])
 
 
 def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
@@ -40,14 +46,32 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
 
     Raises ValueError where a folder belongs to another run, RuntimeError where workers keep dying or Ray is missing.
     """
-    if settings.workers < 1:
-        raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
+    _check(settings)
     trials = suite(settings.suite, settings.seed, settings.time_limit)
     cap = None if settings.signs else settings.cap
-    controller_config(settings.preset, cap)  # refuses before the folder is claimed
     model = settings.model.resolve() if settings.model else None  # workers elsewhere stand in other folders
     driver = DriverSettings(agent=settings.agent, model=model, preset=settings.preset, cap=cap)
     require_writable_folder(settings.out)
+    with held(settings.out):
+        yield from _benchmark(settings, driver, trials)
+
+
+def _check(settings: BenchmarkSettings) -> None:
+    """Refuses what no benchmark can be made of before a folder is claimed."""
+    if settings.workers < 1:
+        raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
+    if settings.seed < 0:
+        raise ValueError(f"found --seed {settings.seed}, wanted 0 or more: type --seed 0")
+    if settings.suite not in SUITES and (settings.seed, settings.time_limit) != (0, "paper"):
+        raise ValueError(
+            f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
+        )
+    controller_config(settings.preset, None if settings.signs else settings.cap)
+
+
+def _benchmark(
+    settings: BenchmarkSettings, driver: DriverSettings, trials: list[Trial]
+) -> Iterator[tuple[int, int, bool]]:
     claim(settings)
     ours = makings(driver)
     for drive in driven_elsewhere(settings.known, _missing(settings, trials), read_run(settings.out)):

@@ -6,10 +6,13 @@ one agent, model, code and precision only.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
 import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -67,11 +70,27 @@ def _identity(settings: BenchmarkSettings) -> dict[str, Any]:
     """What a folder's results depend on."""
     own = Path(settings.suite) if settings.suite not in SUITES else None
     return {
-        "suite": settings.suite, "suite_content": _digest(own), "agent": settings.agent,
+        "suite": str(own.resolve()) if own else settings.suite, "suite_content": _digest(own), "agent": settings.agent,
         "cap": None if settings.signs else settings.cap, "preset": settings.preset,
         "time_limit": settings.time_limit, "seed": settings.seed,
         **makings(DriverSettings(agent=settings.agent, model=settings.model)),
     }  # fmt: skip
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Keeps a folder for this process; two that write at once would lose lines. Raises ValueError where it is kept."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise ValueError(
+            f"found another benchmark at work in {folder}, wanted it alone: wait for it, or give another --out"
+        ) from error
+    finally:
+        os.close(file)
 
 
 def claim(settings: BenchmarkSettings) -> None:

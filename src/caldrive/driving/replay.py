@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.datatypes import Step
+from caldrive.driving.benchmark import driven
 from caldrive.driving.drivers import set_up
 from caldrive.driving.film import EpisodeFilm, caption
 from caldrive.driving.ledger import RESULTS, read_lines, read_run
@@ -46,6 +47,8 @@ def replay(folder: Path, key: str, out: Path, progress: Progress = silent) -> Re
     """
     run = read_run(folder)
     trial, known = _trial(run, key), read_lines(folder / RESULTS)
+    if key in known:
+        driven(trial, known[key])  # refuses another episode of this name
     require_writable_file(out, "--out")
     model = Path(run["model_file"]) if run["model_file"] else None
     world, agent = set_up(DriverSettings(agent=run["agent"], model=model, preset=run["preset"], cap=run["cap"]))

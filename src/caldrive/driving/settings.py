@@ -52,7 +52,7 @@ class DriveSettings(DriverSettings):
     episodes: int = 1
     """How many episodes, one for each route from --route on."""
     video: bool = True
-    """Do not film the drive."""
+    """Film the drive; --no-video does not, and draws no speeds."""
     out: Path = Path("out/drive")
     """Folder for drive.mp4, and for each episode its trace (JSON) and its speed over distance (PNG)."""
 

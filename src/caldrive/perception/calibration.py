@@ -39,8 +39,8 @@ def calibrated(
 
 @torch.no_grad()
 def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
-    """For each convolution the size that all but one in ten thousand of the values that enter it stay below, as
-    normalised images (N, 3, H, W) pass."""
+    """For each convolution the size that all but one in ten thousand of the values that enter it stay below, as a few
+    of the normalised images (N, 3, H, W) pass: the largest over these groups."""
     found: list[list[float]] = []
 
     def note(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:

@@ -113,7 +113,7 @@ def _salt_and_pepper(images: Tensor, groups: Tensor, config: Augmentation, gener
 def augment(
     images: Tensor, generator: Generator, groups: Tensor | None = None, config: Augmentation | None = None
 ) -> Tensor:
-    """Change colour, saturation, contrast, brightness and sharpness and add salt and pepper, in place.
+    """Images with other colours, saturation, contrast, brightness and sharpness, and with salt and pepper.
 
     images (N, 3, H, W): as from `to_float`, in [0, 1] and on the CPU.
     groups (N,): frames of one number (from 0) change alike, so that no sequence flickers; default: each by itself.

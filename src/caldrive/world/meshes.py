@@ -173,10 +173,3 @@ def turned(mesh: Mesh, pose: Pose, height: float = 0.0, scale: float = 1.0) -> M
     made["position"] = scale * made["position"] @ turn + np.array([pose.x, pose.y, height])
     made["normal"] = packed((made["normal"] - 128.0) / 127 @ turn)
     return Mesh(made, mesh.triangles)
-
-
-def tinted(mesh: Mesh, color: RGB) -> Mesh:
-    """A mesh with its colours multiplied by a colour."""
-    made = mesh.vertices.copy()
-    made["color"] = made["color"] * (np.asarray(color) / 255.0)
-    return Mesh(made, mesh.triangles)

@@ -23,7 +23,6 @@ SETBACK = 1.4  # m from the sidewalk to a façade
 PUSHED_BACK = (0.0, 1.0, 2.5)  # m more where a bend leaves too little room
 TREE_LINE = 2.6  # m from the kerb: the sidewalk's outer third
 LAMP_LINE = 0.55
-YARD_LINE = SIDEWALK_WIDTH + 1.2
 CLEAR_OF_POSTS = 6.5  # m around lights and signs without trees, which would hide them
 
 Floats = NDArray[np.float64]
