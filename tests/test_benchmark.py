@@ -15,6 +15,7 @@ from caldrive.driving import benchmark as runner
 from caldrive.driving import ledger, worker
 from caldrive.driving.benchmark import benchmark, read_results
 from caldrive.driving.ledger import read_lines
+from caldrive.driving.replay import replay
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import suite, to_json
 from caldrive.driving.witness import read_trace, trace_path
@@ -87,6 +88,15 @@ def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, mo
     monkeypatch.setattr(ledger, "code_version", lambda: "other")
     with pytest.raises(ValueError, match="with code"):
         next(benchmark(whole))
+
+
+def test_an_episode_driven_again_goes_as_before(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (trial, *_) = suite(whole.suite)
+    found = replay(whole.out, trial.key, tmp_path / "again.mp4")
+    assert found.same
+    assert found.video.stat().st_size > 1000
+    with pytest.raises(ValueError, match="found no episode 'x'"):
+        replay(whole.out, "x", tmp_path / "other.mp4")
 
 
 def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.datatypes import Pose, Scenario
-from caldrive.driving.measures import cells, completion, driving_score, rates, wilson
+from caldrive.driving.measures import cells, comfort, completion, driving_score, errors, rates, reds, wilson
 from caldrive.driving.suites import Driven, Trial
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 
@@ -79,3 +81,32 @@ def test_what_others_cause_does_not_count() -> None:
     hit = Infraction(InfractionKind.COLLISION_CAR, 1.0, 0, 0, at_fault=False)
     one = replace(one, result=replace(one.result, infractions=(hit,)))
     assert all(rate.count == 0 for rate in rates([one]))
+
+
+def rode(duration: float, figures: dict[str, Any], **ride: float) -> Driven:
+    """An episode of so many seconds with these figures of behaviour and of comfort."""
+    one = driven()
+    return replace(one, result=replace(one.result, duration=duration, comfort=ride), figures=figures)
+
+
+def test_comfort_weighs_each_episode_by_its_time() -> None:
+    first = rode(10.0, {}, center_distance=0.1, jerk=1.0, lateral_straight=1.0, lateral_turn=3.0, turning=10.0,
+                 comfortable=1.0)  # fmt: skip
+    second = rode(30.0, {}, center_distance=0.3, jerk=3.0, lateral_straight=2.0, lateral_turn=9.0, turning=0.0,
+                  comfortable=0.5)  # fmt: skip
+    found = comfort([first, second])
+    assert found["center_distance"] == pytest.approx(0.2)  # the median of two
+    assert found["jerk"] == pytest.approx(math.sqrt((10 * 1 + 30 * 9) / 40))
+    assert found["lateral_straight"] == pytest.approx(2.0)  # the first one only turned
+    assert found["lateral_turn"] == pytest.approx(3.0)  # the second one never did
+    assert found["comfortable"] == pytest.approx((10 + 15) / 40)
+
+
+def test_red_lights_are_those_stopped_for_and_those_run() -> None:
+    ran = replace(driven(broken=(InfractionKind.RED_LIGHT,)), figures={"reds_obeyed": 0})
+    assert reds([replace(driven(), figures={"reds_obeyed": 3}), ran]) == (4, 1)
+
+
+def test_errors_weigh_each_episode_by_its_time_where_something_was_seen() -> None:
+    seen = [rode(10.0, {"error/hazard_stop": 0.1}), rode(30.0, {"error/hazard_stop": 0.3}), rode(60.0, {})]
+    assert errors(seen) == {"hazard_stop": pytest.approx(0.25)}

@@ -83,14 +83,19 @@ def held(folder: Path) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     file = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _lock(file, folder)
         yield
+    finally:
+        os.close(file)
+
+
+def _lock(file: int, folder: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise ValueError(
             f"found another benchmark at work in {folder}, wanted it alone: wait for it, or give another --out"
         ) from error
-    finally:
-        os.close(file)
 
 
 def claim(settings: BenchmarkSettings) -> None:
