@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from caldrive.datatypes import Affordances, Control, Decision, DriveState, Observation, Pose, Step, Truth, VehicleState
 from caldrive.driving.agent import NOTHING
 from caldrive.driving.behaviour import Behaviour, reds_obeyed
+from caldrive.driving.trace import json_line
 from caldrive.results import Infraction, InfractionKind
 from tests.perception_data import column_image
 
@@ -37,6 +39,16 @@ def test_time_off_the_lane_counts() -> None:
     for k in range(60):
         behaviour.add(step(k / 10, true, true, opposite=0.5 if k < 15 else 0.1))
     assert behaviour.figures([])["off_lane"] == pytest.approx(0.25)
+
+
+def test_all_figures_are_jsons() -> None:
+    behaviour, red = Behaviour(), Affordances(red_light=1.0)
+    for k in range(20):
+        seen = step(k / 10, red, red)
+        behaviour.add(replace(seen, truth=replace(seen.truth, ego=VehicleState(Pose(0, 0, 0), 0.0))))
+    figures = behaviour.figures([Infraction(InfractionKind.SIDEWALK, 1.0, 0, 0)])
+    assert json.loads(json_line(figures)) == figures
+    assert figures["reds_obeyed"] == 1
 
 
 APPROACH = [8.0, 6.0, 4.0, 2.0, 0.0, 0.0, 0.0, 0.0]  # m/s, to a stand

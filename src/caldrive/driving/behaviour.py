@@ -66,7 +66,7 @@ def reds_obeyed(time: Column, red: Column, speed: Column, run: Sequence[float]) 
     approaches = np.split(steps, np.flatnonzero(np.diff(time[steps]) > SAME_LIGHT) + 1)
     begins = time[[approach[0] for approach in approaches]]
     lost = {int(np.searchsorted(begins, moment, side="right")) - 1 for moment in run}
-    return sum(k not in lost and speed[approach].min() < STANDING for k, approach in enumerate(approaches))
+    return sum(k not in lost and bool(speed[approach].min() < STANDING) for k, approach in enumerate(approaches))
 
 
 def _errors(seen: Affordances, true: Affordances) -> tuple[float, ...]:
