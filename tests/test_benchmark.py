@@ -99,6 +99,12 @@ def test_an_episode_driven_again_goes_as_before(whole: BenchmarkSettings, tmp_pa
         replay(whole.out, "x", tmp_path / "other.mp4")
 
 
+def test_results_that_nothing_says_whose_they_are_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").touch()
+    with pytest.raises(ValueError, match=r"no run\.json that says whose"):
+        next(benchmark(replace(whole, out=tmp_path)))
+
+
 def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
     with ledger.held(tmp_path), pytest.raises(ValueError, match="another benchmark at work"):
         next(benchmark(replace(whole, out=tmp_path)))
@@ -126,6 +132,7 @@ def test_what_a_suite_does_not_take_claims_no_folder(
     "line", ["nonsense", "3", '{"key": "a"}', '{"key": "a", "result": 3, "figures": {}}', '{"key": NaN}'], ids=str
 )
 def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_bytes((whole.out / "run.json").read_bytes())
     (tmp_path / "results.jsonl").write_text(line + "\n")
     with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
         next(benchmark(replace(whole, out=tmp_path)))

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -91,3 +92,11 @@ def test_files_that_are_no_suites_are_named(tmp_path: Path) -> None:
             from_json(path)
     with pytest.raises(ValueError, match="type --suite quick"):
         suite("corl")
+
+
+@pytest.mark.parametrize("key", ["../../precious", "/tmp/a", "", ".", "a/b", None, {"a": 1}, "a" * 101, "a\0"])
+def test_a_key_that_could_not_name_a_file_is_refused(key: object, tmp_path: Path) -> None:
+    rows = json.loads(to_json(suite("quick")[:1]))
+    (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"key": key}]))
+    with pytest.raises(ValueError, match=r"found key .*wanted letters"):
+        suite(str(tmp_path / "own.json"))

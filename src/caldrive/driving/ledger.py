@@ -102,6 +102,8 @@ def claim(settings: BenchmarkSettings) -> None:
     """Writes down whose results a folder holds. Raises ValueError where they are another's."""
     path, wanted = settings.out / RUN, _identity(settings)
     if not path.is_file():
+        if (settings.out / RESULTS).is_file():
+            raise ValueError(f"found results in {settings.out}, but no {RUN} that says whose: give another --out")
         file = {
             "model_file": str(settings.model.resolve()) if settings.model else None,
             "began": datetime.now(UTC).isoformat(timespec="seconds"),

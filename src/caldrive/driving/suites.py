@@ -6,6 +6,7 @@ The conditions are those of the paper's tables: the training town and weathers, 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -133,6 +134,13 @@ def to_json(trials: list[Trial]) -> str:
     return json.dumps(rows, indent=1)
 
 
+def _key(value: Any) -> str:
+    """A trial's key, which names files."""
+    if not isinstance(value, str) or not re.fullmatch(r"\w[\w.-]{0,99}", value, re.ASCII):
+        raise ValueError(f"found key {value!r}, wanted letters, digits, -, _ and .")
+    return value
+
+
 def from_json(path: Path) -> list[Trial]:
     """The inverse of `to_json`. Raises ValueError where the file is missing, holds something else, or a key twice."""
     if not path.is_file():
@@ -140,7 +148,7 @@ def from_json(path: Path) -> list[Trial]:
     try:
         trials = [
             Trial(
-                str(row["key"]), str(row["condition"]), scenario_from_json(json.dumps(row["scenario"])),
+                _key(row["key"]), str(row["condition"]), scenario_from_json(json.dumps(row["scenario"])),
                 tuple(InfractionKind(kind) for kind in row.get("fatal", ())),
             )
             for row in json.loads(path.read_text())
