@@ -82,8 +82,7 @@ def without_errors(
     affordances: Affordances, speed: float, memory: Memory, dt: float, config: LongitudinalConfig
 ) -> tuple[Affordances, Memory]:
     """What to stop for: not for a hazard that is no car and stays for longer than any does; and before a light that
-    stays red for long the car rolls on a little, from where it may look otherwise, and waits anew; but so far only that
-    its front stays before the line.
+    stays red for long the car rolls on a little, from where it may look otherwise, and waits anew, red_rolls times.
 
     Returns the memory with the seconds waited, too; speed in km/h.
     """

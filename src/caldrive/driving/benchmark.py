@@ -48,9 +48,8 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     """
     _check(settings)
     trials = suite(settings.suite, settings.seed, settings.time_limit)
-    cap = None if settings.signs else settings.cap
     model = settings.model.resolve() if settings.model else None  # workers elsewhere stand in other folders
-    driver = DriverSettings(agent=settings.agent, model=model, preset=settings.preset, cap=cap)
+    driver = DriverSettings(agent=settings.agent, model=model, preset=settings.preset, cap=settings.pace)
     require_writable_folder(settings.out)
     with held(settings.out):
         yield from _benchmark(settings, driver, trials)
@@ -66,7 +65,7 @@ def _check(settings: BenchmarkSettings) -> None:
         raise ValueError(
             f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
         )
-    controller_config(settings.preset, None if settings.signs else settings.cap)
+    controller_config(settings.preset, settings.pace)
 
 
 def _benchmark(

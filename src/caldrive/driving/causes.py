@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.driving.behaviour import STANDING
+
 Columns = Mapping[str, list[Any]]
 
 OFF_LANE, ASTRAY = 1.3, 3.0  # m from the centre line, where a wheel is over the marking of a lane of 4 m, and s of it
 BEFORE = 2.0  # s in which what is seen leads to what happens
-STANDING = 0.3  # m/s
 NEEDLESS, FLICKER = 10.0, 3.0  # s of a stop for nothing that make a goal be missed, and of a pause within either
 GRID = 10.0  # m within which places are one
 

@@ -71,7 +71,7 @@ def _identity(settings: BenchmarkSettings) -> dict[str, Any]:
     own = Path(settings.suite) if settings.suite not in SUITES else None
     return {
         "suite": str(own.resolve()) if own else settings.suite, "suite_content": _digest(own), "agent": settings.agent,
-        "cap": None if settings.signs else settings.cap, "preset": settings.preset,
+        "cap": settings.pace, "preset": settings.preset,
         "time_limit": settings.time_limit, "seed": settings.seed,
         **makings(DriverSettings(agent=settings.agent, model=settings.model)),
     }  # fmt: skip

@@ -87,6 +87,11 @@ class BenchmarkSettings:
     seed: int = 0
     """Decides everything random: traffic, pedestrians, lights."""
 
+    @property
+    def pace(self) -> float | None:
+        """The speed in km/h that no limit exceeds; None where the signs alone count."""
+        return None if self.signs else self.cap
+
 
 @dataclass(frozen=True)
 class DeterminismSettings(DriverSettings):
