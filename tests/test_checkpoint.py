@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -78,4 +79,18 @@ def test_other_affordances_and_formats_are_refused(
             load_network(tmp_path / "model.safetensors")
     monkeypatch.setattr(checkpoint, "FORMAT_VERSION", 99)
     with pytest.raises(CheckpointError, match="format 1, this caldrive reads 99"):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_weights_that_are_not_numbers_are_refused(network: Network, tmp_path: Path) -> None:
+    next(iter(network.blocks.parameters())).data[0] = float("nan")
+    save_network(tmp_path / "model.safetensors", network, INFO)
+    with pytest.raises(CheckpointError, match="not numbers"):
+        load_network(tmp_path / "model.safetensors")
+
+
+@pytest.mark.parametrize("one", [0.0, -1.0])
+def test_ranges_that_hold_nothing_are_refused(one: float, network: Network, tmp_path: Path) -> None:
+    save_network(tmp_path / "model.safetensors", network, replace(INFO, ranges=(one,) * 13))
+    with pytest.raises(CheckpointError, match="not more than 0"):
         load_network(tmp_path / "model.safetensors")

@@ -4,6 +4,7 @@ unpickled."""
 from __future__ import annotations
 
 import json
+import math
 import struct
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -114,10 +115,14 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         config = config_from_dict(header["config"])
         network = Network(config)
         network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
+        ranges = tuple(map(float, header.get("ranges", ())))
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise CheckpointError(
             f"the weights in {path} do not fit its own configuration: train the network anew"
         ) from error
-    ranges = tuple(header.get("ranges", ()))
     info = CheckpointInfo(config, header["data"], header["metrics"], header["training"], header["seed"], ranges)
+    if not all(bool(value.isfinite().all()) for value in network.state_dict().values()):
+        raise CheckpointError(f"{path} has weights that are not numbers: train the network anew")
+    if not all(0 < one < math.inf for one in ranges):
+        raise CheckpointError(f"{path} has ranges of integers that are not more than 0: train the network anew")
     return network.eval(), info
