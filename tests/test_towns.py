@@ -11,7 +11,7 @@ from caldrive.world import netconvert
 from caldrive.world.netconvert import convert_opendrive
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.towns import load_town
-from tests.test_opendrive import sign_at, write_map
+from tests.maps import sign_at, write_map
 
 needs_netconvert = pytest.mark.skipif(
     not pytest.importorskip("importlib.util").find_spec("sumo"), reason="netconvert comes with the extra opendrive"
