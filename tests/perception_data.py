@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from caldrive.config import BlockConfig, PerceptionConfig
-from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Pose, Scenario
+from caldrive.config import BlockConfig, PerceptionConfig, TrainingConfig
+from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Observation, Pose, Scenario
 from caldrive.episodes import EpisodeWriter, Frame
 
 HEIGHT, WIDTH = 32, 64
@@ -24,6 +24,11 @@ TINY = PerceptionConfig(
     relative_angle=BlockConfig("dense", 8, 0.0, length=2),
     center_distance=BlockConfig("dense", 8, 0.0),
 )
+SHORT = TrainingConfig(
+    steps=6, batch=4, window=3, warm_up=2, block_steps=0, evaluate_every=100, save_every=2, precision="fp32",
+    validation_share=0.3,
+)  # fmt: skip
+BLOCKS = replace(SHORT, block_steps=5, block_batch=8)
 
 
 def column_image(center_distance: float, red: bool = False) -> Image:
@@ -59,3 +64,21 @@ def record(folder: Path, n_episodes: int = 3, n_frames: int = 40, n_cameras: int
                     seen = classes.integers(0, 8, (HEIGHT, WIDTH), dtype=np.uint8) if semantic else None
                     writer.append(replace(frame, semantic=seen))
     return folder
+
+
+def see(image: Image, index: int = 0) -> Observation:
+    """An image as the driver of frame `index` has it before him."""
+    frame = make_frame(index)
+    return Observation(frame.time, image, frame.speed, frame.command)
+
+
+def values(a: Affordances) -> list[float]:
+    """All six as numbers."""
+    return [
+        a.hazard_stop,
+        a.red_light,
+        float(a.speed_sign or 0),
+        a.vehicle_distance,
+        a.relative_angle,
+        a.center_distance,
+    ]

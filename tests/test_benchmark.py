@@ -19,6 +19,7 @@ from caldrive.driving.replay import replay
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import suite, to_json
 from caldrive.driving.witness import read_trace, trace_path
+from tests.traces import trace
 
 pytestmark = pytest.mark.usefixtures("fresh_worker")
 
@@ -138,6 +139,44 @@ def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: 
         next(benchmark(replace(whole, out=tmp_path)))
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"duration": "abc"}, {"route_length": 0.0}, {"distance": -1.0}, {"comfort": None}, {"outcome": "won"},
+        {"infractions": [{"kind": "flight"}]}, {"scenario": {}},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_results_that_cannot_be_are_named(change: dict[str, Any], whole: BenchmarkSettings, tmp_path: Path) -> None:
+    line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
+    for spoilt in (line | {"result": line["result"] | change}, line | {"figures": {"off_lane": None}}):
+        (tmp_path / "results.jsonl").write_text(json.dumps(spoilt) + "\n")
+        with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
+            read_lines(tmp_path / "results.jsonl")
+
+
+def test_an_episode_that_is_there_twice_is_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").write_bytes((whole.out / "results.jsonl").read_bytes() * 2)
+    with pytest.raises(ValueError, match="is there twice"):
+        read_lines(tmp_path / "results.jsonl")
+
+
+def test_a_suite_that_has_changed_since_is_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    path = tmp_path / "own.json"
+    town = tmp_path / "town.xodr"
+    town.write_text("first")
+    trials = suite(whole.suite)
+    elsewhere = replace(trials[0], key="x", scenario=replace(trials[0].scenario, town=str(town)))
+    path.write_text(to_json([*trials, elsewhere]))
+    about = ledger.read_run(whole.out) | {"suite": str(path), "suite_content": ledger.suite_content(path)}
+    ledger.require_same_suite(about)
+    shorter = to_json(trials[:1])
+    for change in (lambda: town.write_text("second"), town.unlink, lambda: path.write_text(shorter), path.unlink):
+        change()
+        with pytest.raises(ValueError, match="is not what was driven"):
+            ledger.require_same_suite(about)
+
+
 @pytest.mark.parametrize("text", ["[1", "[]", "{}", '{"suite": 3}'])
 def test_a_damaged_description_is_named(text: str, tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(text)
@@ -145,7 +184,17 @@ def test_a_damaged_description_is_named(text: str, tmp_path: Path) -> None:
         ledger.read_run(tmp_path)
 
 
-@pytest.mark.parametrize("content", [b"garbage", gzip.compress(b"{"), gzip.compress(b'{"trace": 3}')], ids=range(3))
+def packed(columns: dict[str, Any]) -> bytes:
+    return gzip.compress(json.dumps({"trace": columns}).encode())
+
+
+SPOILT = [
+    b"garbage", gzip.compress(b"{"), gzip.compress(b'{"trace": 3}'), packed({}), packed(trace() | {"x": [1.0]}),
+    packed(trace(0)), packed(trace(time="noon")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("content", SPOILT, ids=range(len(SPOILT)))
 def test_a_damaged_trace_is_named(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "traces").mkdir()
     trace_path(tmp_path, "a").write_bytes(content)
@@ -165,7 +214,7 @@ OURS = {"code": "1", "model": None, "precision": None}
 
 @pytest.mark.parametrize("name", ["code", "model", "precision"])
 def test_a_worker_that_drives_with_something_else_is_refused(name: str, tmp_path: Path) -> None:
-    drive = worker.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS | {name: "other"})
+    drive = worker.TrialRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS | {name: "other"})
     with pytest.raises(ValueError, match=f"worker with {name} other.*install the same caldrive and model"):
         runner._keep(tmp_path, drive, OURS)
     assert not list(tmp_path.iterdir())
@@ -174,6 +223,6 @@ def test_a_worker_that_drives_with_something_else_is_refused(name: str, tmp_path
 def test_files_are_there_before_their_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "append", lambda path, line: pytest.fail("was killed before the line"))
     with pytest.raises(pytest.fail.Exception):
-        runner._keep(tmp_path, worker.Drive({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS), OURS)
+        runner._keep(tmp_path, worker.TrialRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, OURS), OURS)
     assert (tmp_path / "traces" / "a.json.gz").read_bytes() == b"x"
     assert read_lines(tmp_path / "results.jsonl") == {}

@@ -20,8 +20,7 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.precision import features_in
 from caldrive.perception.training import train
-from tests.perception_data import HEIGHT, TINY, WIDTH, record
-from tests.test_training import BLOCKS, SHORT
+from tests.perception_data import BLOCKS, HEIGHT, SHORT, TINY, WIDTH, record
 
 
 @pytest.fixture(scope="module")

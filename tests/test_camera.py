@@ -159,14 +159,16 @@ def test_the_towns_look_different(camera: Camera) -> None:
     for drawn, network in ((camera, load_town("town02")), (other, roads)):
         lane = max(network.driveable, key=lambda lane: lane.line.length)
         pose = moved(lane.line.pose_at(lane.line.length / 2), left=-3.5)
-        sidewalks.append(drawn.render_from(2, pose, 1.2, -0.9, size=(64, 64)).reshape(-1, 3).mean(axis=0))
+        [seen] = drawn.render_through([Lens(pose, 1.2, -0.9, 90.0, (64, 64))], 2, (), (), {}, 0.0)
+        sidewalks.append(seen.reshape(-1, 3).mean(axis=0))
     assert np.abs(sidewalks[0] - sidewalks[1]).max() > 15
     other.close()
 
 
 def test_from_above_the_whole_town_is_seen(camera: Camera, roads: RoadNetwork) -> None:
     x0, y0, x1, y1 = roads.bounds
-    picture = camera.render_from(1, Pose((x0 + x1) / 2, (y0 + y1) / 2, 0.0), 220.0, -np.pi / 2, size=(64, 64))
+    above = Lens(Pose((x0 + x1) / 2, (y0 + y1) / 2, 0.0), 220.0, -np.pi / 2, 90.0, (64, 64))
+    [picture] = camera.render_through([above], 1, (), (), {}, 0.0)
     assert picture.reshape(-1, 3).std(axis=0).min() > 10
 
 

@@ -1,16 +1,20 @@
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
 from safetensors.torch import save_file
 
-from caldrive.config import PERCEPTIONS
+from caldrive.config import PERCEPTIONS, PerceptionConfig
 from caldrive.perception import checkpoint
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, save_network, write_tensors
 from caldrive.perception.network import Network
+from caldrive.perception.specs import describe
+from caldrive.typed import as_type
 from tests.perception_data import TINY
 
 INFO = CheckpointInfo(TINY, {"train_frames": 10}, {"loss": 0.5}, {"steps": 3}, seed=4)
@@ -44,7 +48,7 @@ def test_half_precision_halves_the_file_and_hardly_changes_the_outputs(network: 
 @pytest.mark.parametrize("preset", ["small", "paper"])
 def test_configurations_survive_a_dictionary(preset: str) -> None:
     config = PERCEPTIONS[preset]
-    assert checkpoint.config_from_dict(checkpoint.asdict(config)) == config
+    assert as_type(json.loads(json.dumps(asdict(config))), PerceptionConfig) == config
 
 
 def test_missing_damaged_and_foreign_files_are_told_apart(network: Network, tmp_path: Path) -> None:
@@ -67,6 +71,24 @@ def test_weights_of_another_network_are_refused(network: Network, tmp_path: Path
     save_network(tmp_path / "model.safetensors", network, CheckpointInfo(PERCEPTIONS["small"]))
     with pytest.raises(CheckpointError, match="do not fit"):
         load_network(tmp_path / "model.safetensors")
+
+
+HEADERS: list[dict[str, Any]] = [
+    {"config": asdict(TINY) | {"wings": 2}}, {"config": {"red_light": {"wings": 2}}}, {"metrics": {"loss": "low"}},
+    {"seed": None}, {"ranges": 3},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("header", HEADERS, ids=str)
+def test_headers_that_say_something_else_are_refused(header: dict[str, Any], network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    whole = {"kind": "network", "specs": describe()} | asdict(INFO)
+    write_tensors(path, network.state_dict(), whole | header)
+    with pytest.raises(CheckpointError, match="do not fit"):
+        load_network(path)
+    write_tensors(path, network.state_dict(), {"kind": "network"} | header)
+    with pytest.raises(CheckpointError, match="other affordances"):
+        load_network(path)
 
 
 def test_other_affordances_and_formats_are_refused(

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 from caldrive.datatypes import Alternative, Command
 from caldrive.episode_reader import read_episode
 from caldrive.episodes import FORMAT_VERSION, EpisodeError, EpisodeWriter
-from caldrive.scenarios import scenario_from_json, scenario_to_json
+from caldrive.scenarios import scenario_from_values, scenario_values
 from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
 
 
@@ -90,8 +91,8 @@ def test_an_episode_without_frames_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("limit", [math.inf, 54.0])
 def test_a_scenario_survives_json(limit: float) -> None:
     scenario = replace(SCENARIO, time_limit=limit)
-    assert "Infinity" not in scenario_to_json(scenario)
-    assert scenario_from_json(scenario_to_json(scenario)) == scenario
+    text = json.dumps(scenario_values(scenario), allow_nan=False)
+    assert scenario_from_values(json.loads(text)) == scenario
 
 
 def test_missing_damaged_and_foreign_files_are_told_apart(path: Path, tmp_path: Path) -> None:
@@ -105,6 +106,19 @@ def test_missing_damaged_and_foreign_files_are_told_apart(path: Path, tmp_path: 
     pq.write_table(pa.table({"a": [1]}), foreign)
     with pytest.raises(EpisodeError, match="no episode of caldrive"):
         read_episode(foreign)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("hazard_stop", 1.5), ("vehicle_distance", -1.0), ("speed_sign", 45), ("relative_angle", 4.0), ("time", math.inf)],
+)
+def test_labels_that_cannot_be_are_named(column: str, value: float, path: Path) -> None:
+    table = pq.read_table(path)
+    at = table.schema.get_field_index(column)
+    spoilt = pa.array([value] * len(table), table.schema.field(at).type)
+    pq.write_table(table.set_column(at, table.schema.field(at), spoilt), path)
+    with pytest.raises(EpisodeError, match=f"values in {column} that cannot be"):
+        read_episode(path)
 
 
 def test_another_version_is_refused(path: Path) -> None:

@@ -37,12 +37,28 @@ MISTAKES = {
     "no step to time": (["speed", "world", "--steps", "0"], "type --steps 600"),
     "unknown town, timed": (["speed", "world", "--town", "mars"], "--town town01"),
     "sheet of no kind": (["town", "--sheet", "{tmp}/town.jpg"], "wanted a name that ends in .png"),
-    "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384 pixels"),
+    "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384"),
     "sheet of too many looks": (["town", "--sheet", "{tmp}/town.png", "--looks", "-1"], "wanted 0 to 100"),
     "no step to learn": (["train", "--steps", "0", "--out", "{tmp}"], "type --steps 1000"),
-    "a rate of nothing": (["train", "--rate", "0", "--out", "{tmp}"], "type --rate 4e-4"),
+    "a rate of nothing": (["train", "--rate", "0", "--out", "{tmp}"], "type --rate 0.0004"),
     "a cap below nothing, in a suite": (["benchmark", "--cap", "-5", "--out", "{tmp}"], "type --cap 20"),
     "a cap that is no number, in a suite": (["benchmark", "--cap", "nan", "--out", "{tmp}"], "type --cap 20"),
+    "a cap without end, in a suite": (["benchmark", "--cap", "inf", "--out", "{tmp}"], "type --cap 20"),
+    "an unknown agent, in a suite": (
+        ["benchmark", "--agent", "bob", "--out", "{tmp}/new"],
+        "wanted one of cal, oracle",
+    ),
+    "a negative seed, in a suite": (["benchmark", "--seed", "-1", "--out", "{tmp}/new"], "type --seed 0"),
+    "no such model, in a suite": (["benchmark", "--model", "{tmp}/gone.safetensors", "--out", "{tmp}/new"], "gone"),
+    "no known benchmark": (["benchmark", "--known", "{tmp}", "--out", "{tmp}/new"], "found no run.json in"),
+    "a seed too large": (["benchmark", "--seed", "9999999999", "--out", "{tmp}/new"], "type --seed 0"),
+    "a negative seed, to learn from": (["train", "--seed", "-1", "--out", "{tmp}"], "type --seed 0"),
+    "less than no car, timed": (["speed", "world", "--cars", "-1"], "type --cars 20"),
+    "steps without end": (["speed", "world", "--steps", "1000000000000"], "type --steps 600"),
+    "a drive without end": (["collect", "--duration", "inf", "--out", "{tmp}/new"], "type --duration 12.0"),
+    "an image without end": (["collect", "--width", "100000", "--out", "{tmp}/new"], "type --width 200"),
+    "a video over results": (["replay", "{tmp}", "a", "--out", "{tmp}/results.jsonl"], "ends in .mp4"),
+    "a picture over a recording": (["data", "{tmp}", "--picture", "{tmp}/a.parquet"], "ends in .png"),
     "sheet in a folder's place": (["town", "--sheet", "{tmp}/folder.png"], "is a folder"),
 }
 
@@ -90,7 +106,9 @@ def test_a_full_disk_is_named_in_words(monkeypatch: pytest.MonkeyPatch, capsys: 
 
     monkeypatch.setattr("caldrive.driving.drive.drive", fail)
     assert main(DRIVE) == 2
-    assert capsys.readouterr().err == "caldrive: cannot use out/drive.mp4: no space left on device\n"
+    assert capsys.readouterr().err == (
+        "caldrive: found that out/drive.mp4 is no use (no space left on device), wanted one that is: give another\n"
+    )
 
 
 def test_ctrl_c_ends_in_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,6 @@ from caldrive.geometry import (
     boxes_overlap,
     moved,
     polygon_distance,
-    segments_cross,
     to_local,
     to_world,
     wrap_angle,
@@ -68,13 +67,6 @@ def test_distance_of_two_squares(x: float, distance: float) -> None:
 def test_a_corner_near_an_edge_does_not_overlap() -> None:
     assert not boxes_overlap(UNIT, box_corners(Pose(1.9, 1.9, math.pi / 4), 2, 2))
     assert boxes_overlap(UNIT, box_corners(Pose(1.6, 1.6, math.pi / 4), 2, 2))
-
-
-def test_segments_cross() -> None:
-    line = np.array([(0.0, -1.0), (0.0, 1.0)])
-    assert segments_cross(line, np.array([(-1.0, 0.0), (1.0, 0.5)]))
-    assert not segments_cross(line, np.array([(-1.0, 2.0), (1.0, 2.0)]))
-    assert not segments_cross(line, np.array([(-2.0, 0.0), (-1.0, 0.0)]))
 
 
 def bend() -> Polyline:

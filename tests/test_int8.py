@@ -17,8 +17,7 @@ from caldrive.perception.int8 import Int8Backbone
 from caldrive.perception.network import Network
 from caldrive.perception.precision import driving_precision
 from caldrive.perception.predictor import NetworkPerception
-from tests.perception_data import HEIGHT, TINY, WIDTH, column_image
-from tests.test_predictor import see, values
+from tests.perception_data import HEIGHT, TINY, WIDTH, column_image, see, values
 
 
 def columns() -> Tensor:

@@ -3,8 +3,10 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Callable, Iterator
 from functools import partial
 from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -80,19 +82,41 @@ def _lives(pid: int) -> bool:
         return False
 
 
-def test_workers_end_with_the_process_that_they_work_for(tmp_path: Path) -> None:
+@pytest.fixture
+def sleepers(tmp_path: Path) -> Iterator[tuple[BaseProcess, list[int]]]:
+    """A process whose two workers sleep, and their numbers."""
     parent = get_context("spawn").Process(target=_spread_sleepers, args=(tmp_path,))
     parent.start()
-    until = time.monotonic() + 20
-    while len(workers := [int(path.name) for path in tmp_path.iterdir()]) < 2 and time.monotonic() < until:
-        time.sleep(0.05)
-    assert all(map(_lives, workers))
+    _within_seconds(lambda: len(list(tmp_path.iterdir())) == 2)
+    workers = [int(path.name) for path in tmp_path.iterdir()]
     assert len(workers) == 2
+    assert all(map(_lives, workers))
+    yield parent, workers
     parent.kill()
     parent.join()
-    while any(map(_lives, workers)) and time.monotonic() < until:
+
+
+def _within_seconds(true: Callable[[], bool]) -> bool:
+    until = time.monotonic() + 60
+    while not true() and time.monotonic() < until:
         time.sleep(0.05)
-    assert not any(map(_lives, workers))
+    return true()
+
+
+def test_workers_end_with_the_process_that_they_work_for(sleepers: tuple[BaseProcess, list[int]]) -> None:
+    parent, workers = sleepers
+    parent.kill()
+    parent.join()
+    assert _within_seconds(lambda: not any(map(_lives, workers)))
+
+
+def test_ctrl_c_ends_workers_without_a_word(
+    sleepers: tuple[BaseProcess, list[int]], capfd: pytest.CaptureFixture[str]
+) -> None:
+    for worker in sleepers[1]:
+        os.kill(worker, signal.SIGINT)
+    assert _within_seconds(lambda: not any(map(_lives, sleepers[1])))
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def _spread_sleepers(folder: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from caldrive.datatypes import Affordances, Image, Observation
+from caldrive.datatypes import Image, Observation
 from caldrive.episode_reader import read_episode
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.dataset import Frames
@@ -15,29 +15,13 @@ from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons
 from caldrive.perception.predictor import BadImage, NetworkPerception
 from caldrive.perception.specs import decode
-from tests.perception_data import HEIGHT, TINY, WIDTH, column_image, make_frame, record
+from tests.perception_data import HEIGHT, TINY, WIDTH, column_image, record, see, values
 
 
 @pytest.fixture
 def network() -> Network:
     torch.manual_seed(0)
     return Network(TINY).eval()
-
-
-def see(image: Image, index: int = 0) -> Observation:
-    frame = make_frame(index)
-    return Observation(frame.time, image, frame.speed, frame.command)
-
-
-def values(a: Affordances) -> list[float]:
-    return [
-        a.hazard_stop,
-        a.red_light,
-        float(a.speed_sign or 0),
-        a.vehicle_distance,
-        a.relative_angle,
-        a.center_distance,
-    ]
 
 
 def test_driving_gives_what_the_whole_episode_gives(network: Network, tmp_path: Path) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from caldrive.episodes import EpisodeError
+from caldrive.episodes import EpisodeError, EpisodeWriter
 from caldrive.perception.recordings import check_recording, draw_histograms
-from tests.perception_data import record
+from tests.perception_data import SCENARIO, make_frame, record
 
 
 @pytest.fixture
@@ -38,6 +41,19 @@ def test_a_cut_file_and_a_broken_image_are_named_and_the_rest_is_counted(folder:
     assert [name in sentence for name, sentence in zip((cut.name, spoilt.name), found.damaged, strict=True)] == [
         True
     ] * 2
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"image": np.zeros((16, 16, 3), np.uint8)}, {"semantic": np.full((32, 64), 99, np.uint8)}]
+)
+def test_images_that_are_none_of_the_recorders_are_named(wrong: dict[str, Any], tmp_path: Path) -> None:
+    sound = replace(make_frame(0), semantic=np.zeros((32, 64), np.uint8))
+    with EpisodeWriter(tmp_path / "a.parquet", SCENARIO) as writer:
+        writer.append(sound)
+        writer.append(replace(sound, index=1, **wrong))
+    found, episodes = check_recording(tmp_path)
+    assert not episodes
+    assert "row 1 of" in found.damaged[0]
 
 
 def test_an_empty_folder_says_what_to_type(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from caldrive.driving.report import Run, failures, load_run, load_runs
+from caldrive.driving.report import BenchmarkRun, failures, load_run, load_runs
 from caldrive.driving.report_figures import _error_sums
 from caldrive.driving.report_page import report_page
 from caldrive.driving.report_tables import tables
@@ -24,13 +24,13 @@ from caldrive.driving.suites import Driven, suite
 from caldrive.driving.trace import result_values
 from caldrive.driving.witness import trace_path
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
-from tests.test_causes import after, trace
+from tests.traces import after, trace
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 ABOUT: dict[str, Any] = {
     "suite": "quick", "agent": "cal", "model": "abc", "cap": 20.0, "code": "123", "began": "2026-01-02T03:04:05+00:00",
     "machine": "two cores", "seed": 0, "time_limit": "paper", "preset": "default", "model_file": None,
-    "suite_content": None, "precision": "int8",
+    "suite_content": None, "precision": "int8", "workers": 2,
 }  # fmt: skip
 COMFORT = {
     "center_distance": 0.05, "jerk": 0.4, "lateral_straight": 0.1, "lateral_turn": 0.2, "turning": 10.0,
@@ -43,7 +43,7 @@ FIGURES: dict[str, Any] = {
 }  # fmt: skip
 
 
-def run(name: str, folder: Path) -> Run:
+def run(name: str, folder: Path) -> BenchmarkRun:
     """The quick suite, driven well but for every fifth episode."""
     driven = []
     for k, trial in enumerate(suite("quick")):
@@ -53,11 +53,11 @@ def run(name: str, folder: Path) -> Run:
         outcome = Outcome.TIMEOUT if k % 10 == 4 else Outcome.SUCCESS
         result = EpisodeResult(trial.scenario, outcome, 50.0, 250.0, 200.0, 250.0, broken, COMFORT)
         driven.append(Driven(trial, result, FIGURES))
-    return Run(name, folder, ABOUT | {"agent": name}, tuple(driven))
+    return BenchmarkRun(name, folder, ABOUT | {"agent": name}, tuple(driven))
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
     made = [run(name, tmp_path_factory.mktemp(name)) for name in ("oracle", "cal")]
     still = made[1].folder / "stills" / f"{made[1].driven[4].trial.key}-0.jpg"
     still.parent.mkdir()
@@ -69,7 +69,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
     return made
 
 
-def test_missed_goals_say_how_they_began(runs: list[Run]) -> None:
+def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
     table = next(one for one in tables(runs) if one.title == "How missed goals began")
     town = runs[1].driven[4].trial.scenario.town
     assert table.rows == (("cal", town, "left its lane", "(100, 0)", "left", "1"),)
@@ -78,7 +78,7 @@ def test_missed_goals_say_how_they_began(runs: list[Run]) -> None:
     assert text in report_page(runs)
 
 
-def test_every_cell_stands_beside_the_papers(runs: list[Run]) -> None:
+def test_every_cell_stands_beside_the_papers(runs: list[BenchmarkRun]) -> None:
     success = next(one for one in tables(runs) if one.title == "Success")
     row = dict(zip(success.head, next(r for r in success.rows if r[:2] == ("new town", "navigation")), strict=True))
     assert row["CAL (paper)"] == "70"
@@ -87,7 +87,7 @@ def test_every_cell_stands_beside_the_papers(runs: list[Run]) -> None:
     assert len(success.rows) == 16
 
 
-def test_infractions_stand_beside_table_2(runs: list[Run]) -> None:
+def test_infractions_stand_beside_table_2(runs: list[BenchmarkRun]) -> None:
     found = next(one for one in tables(runs) if one.title == "Infractions")
     row = next(r for r in found.rows if r[:3] == ("new weather", "navigation-dynamic", "opposite lane"))
     assert row[3].startswith("> ")
@@ -96,13 +96,13 @@ def test_infractions_stand_beside_table_2(runs: list[Run]) -> None:
     assert row[-4:] == ("", "", "", "")  # the paper counts in one task only
 
 
-def test_failures_say_what_was_wrong_before(runs: list[Run]) -> None:
+def test_failures_say_what_was_wrong_before(runs: list[BenchmarkRun]) -> None:
     found = failures(runs)
     assert len(found) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].driven)))
     assert found[0].before == ("relative angle 0.30 rad, hazard stop 50 %",)
 
 
-def test_the_text_holds_all_tables_and_failures(runs: list[Run]) -> None:
+def test_the_text_holds_all_tables_and_failures(runs: list[BenchmarkRun]) -> None:
     text = report_text(runs)
     for table in tables(runs):
         assert f"## {table.title}" in text
@@ -111,7 +111,7 @@ def test_the_text_holds_all_tables_and_failures(runs: list[Run]) -> None:
     assert "caldrive benchmark --suite quick --agent cal --cap 20" in text
 
 
-def test_the_command_says_all_that_is_not_usual(runs: list[Run]) -> None:
+def test_the_command_says_all_that_is_not_usual(runs: list[BenchmarkRun]) -> None:
     about = {"seed": 3, "time_limit": "code", "preset": "paper", "cap": None, "model_file": "/a/b.safetensors"}
     assert replace(runs[0], about=runs[0].about | about).command == (
         "caldrive benchmark --suite quick --agent oracle --signs --preset paper --time-limit code --seed 3 "
@@ -149,7 +149,7 @@ def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
         load_run(tmp_path)
 
 
-def test_two_runs_write_the_same_page(runs: list[Run]) -> None:
+def test_two_runs_write_the_same_page(runs: list[BenchmarkRun]) -> None:
     assert report_page(runs) == report_page(runs)
 
 
@@ -160,13 +160,13 @@ def test_a_blind_frame_is_off_by_nothing_that_counts() -> None:
     assert list(np.flatnonzero(count)) == [6, 7, 8, 9, 10, 11]  # from 30 s on, in slots of 5 s
 
 
-def test_what_comes_from_files_is_text_and_no_markup(runs: list[Run]) -> None:
+def test_what_comes_from_files_is_text_and_no_markup(runs: list[BenchmarkRun]) -> None:
     evil = replace(runs[0], name="<script>alert(1)</script>")
     assert "<script>alert" not in report_page([evil])
 
 
 @pytest.fixture(scope="module")
-def page(runs: list[Run], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def page(runs: list[BenchmarkRun], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     if CHROMIUM is None:
         pytest.skip("no Chromium on this machine: apt-get install chromium")
     from playwright.sync_api import sync_playwright
@@ -213,7 +213,7 @@ def test_a_click_on_a_head_sorts_by_number_and_another_turns_it_round(page: Any)
     assert [int(text) for text in column(page, 1, "CAL")] == sorted(up, reverse=True)
 
 
-def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[Run]) -> None:
+def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[BenchmarkRun]) -> None:
     page.select_option("select[data-filter=run]", "cal")
     page.select_option("select[data-filter=kind]", "sidewalk")
     shown = page.locator("article:visible")

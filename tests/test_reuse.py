@@ -17,12 +17,13 @@ from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import Trial, suite, to_json
 from caldrive.driving.trace import result_values
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
+from tests.traces import trace
 
 pytestmark = pytest.mark.usefixtures("fresh_worker")
 RED, CAR = InfractionKind.RED_LIGHT, InfractionKind.COLLISION_CAR
 BY = {"agent": "oracle", "cap": 20.0, "preset": "default", "code": "1", "model": None, "precision": None}
 SAID = {"suite": "x", "suite_content": None, "time_limit": "paper", "seed": 0, "model_file": None}
-RUN = BY | SAID | {"began": "2026-01-01T00:00:00", "machine": "a clock"}
+RUN = BY | SAID | {"began": "2026-01-01T00:00:00", "machine": "a clock", "workers": 2}
 
 
 def short_suite(path: Path, task: str, fatal: tuple[InfractionKind, ...] = ()) -> str:
@@ -59,7 +60,9 @@ def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[Infr
     (folder / "run.json").write_text(json.dumps(RUN))
     (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
     (folder / "traces").mkdir()
-    (folder / "traces" / "x-0.json.gz").write_bytes(gzip.compress(json.dumps({"result": result, "trace": {}}).encode()))
+    (folder / "traces" / "x-0.json.gz").write_bytes(
+        gzip.compress(json.dumps({"result": result, "trace": trace()}).encode())
+    )
     return folder
 
 

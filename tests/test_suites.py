@@ -4,6 +4,7 @@ import json
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -94,9 +95,28 @@ def test_files_that_are_no_suites_are_named(tmp_path: Path) -> None:
         suite("corl")
 
 
-@pytest.mark.parametrize("key", ["../../precious", "/tmp/a", "", ".", "a/b", None, {"a": 1}, "a" * 101, "a\0"])
-def test_a_key_that_could_not_name_a_file_is_refused(key: object, tmp_path: Path) -> None:
+@pytest.mark.parametrize("key", ["../../precious", "/tmp/a", "", ".", "a/b", "a" * 101, "a\0"])
+def test_a_key_that_could_not_name_a_file_is_refused(key: str, tmp_path: Path) -> None:
     rows = json.loads(to_json(suite("quick")[:1]))
     (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"key": key}]))
     with pytest.raises(ValueError, match=r"found key .*wanted letters"):
+        suite(str(tmp_path / "own.json"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_vehicles": -5},
+        {"n_vehicles": "many"},
+        {"weather": 1.5},
+        {"time_limit": 0},
+        {"start": [1, 2, 3]},
+        {"cars": 3},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], tmp_path: Path) -> None:
+    rows = json.loads(to_json(suite("quick")[:1]))
+    (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"scenario": rows[0]["scenario"] | change}]))
+    with pytest.raises(ValueError, match=r"own\.json is no suite"):
         suite(str(tmp_path / "own.json"))

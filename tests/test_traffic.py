@@ -9,9 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from shapely import LineString
 
 from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, VehicleState
-from caldrive.geometry import box_corners, boxes_overlap, moved, segments_cross, to_local, wrap_angle
+from caldrive.geometry import box_corners, boxes_overlap, moved, to_local, wrap_angle
 from caldrive.world.lights import Lights
 from caldrive.world.roads import Lane, RoadNetwork
 from caldrive.world.traffic import Traffic, in_sight, stop_sumo
@@ -144,7 +145,7 @@ def test_cars_stop_at_red(recording: str, request: pytest.FixtureRequest) -> Non
             for k in np.flatnonzero(np.abs(lines[:, 0] - (a.x, a.y)).sum(1) < 6):
                 light = before.lights[k]
                 if math.cos(a.heading - light.pose.heading) > 0.7:
-                    crossed[light.state] += segments_cross(np.array([(a.x, a.y), (b.x, b.y)]), lines[k])
+                    crossed[light.state] += LineString([(a.x, a.y), (b.x, b.y)]).crosses(LineString(lines[k]))
     assert crossed[LightState.RED] == 0
     assert crossed[LightState.GREEN] > 5
 

@@ -21,13 +21,7 @@ from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, learning_rate
 from caldrive.perception.precision import use_bf16
 from caldrive.perception.training import train
-from tests.perception_data import HEIGHT, TINY, WIDTH, record
-
-SHORT = TrainingConfig(
-    steps=6, batch=4, window=3, warm_up=2, block_steps=0, evaluate_every=100, save_every=2, precision="fp32",
-    validation_share=0.3,
-)  # fmt: skip
-BLOCKS = replace(SHORT, block_steps=5, block_batch=8)
+from tests.perception_data import HEIGHT, SHORT, TINY, WIDTH, record
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -110,6 +104,21 @@ def test_a_state_of_other_settings_is_not_taken_up(folder: Path, tmp_path: Path)
     train(SHORT, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 2)
     with pytest.raises(CheckpointError, match="other settings"):
         train(replace(SHORT, learning_rate=1.0), folder, tmp_path, TINY, progress=False)
+
+
+def test_a_state_of_other_episodes_is_not_taken_up(folder: Path, tmp_path: Path) -> None:
+    train(SHORT, folder, tmp_path / "out", TINY, progress=False, stop=lambda step: step == 2)
+    record(tmp_path / "more", n_episodes=5)
+    with pytest.raises(CheckpointError, match="other episodes"):
+        train(SHORT, tmp_path / "more", tmp_path / "out", TINY, progress=False)
+
+
+def test_damaged_metrics_are_named(folder: Path, tmp_path: Path) -> None:
+    train(SHORT, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 2)
+    for content in ("{", "[]", '{"loss": 1}', '{"step": "a"}'):
+        (tmp_path / "metrics.jsonl").write_text(content + "\n")
+        with pytest.raises(CheckpointError, match=r"metrics\.jsonl is damaged"):
+            train(SHORT, folder, tmp_path, TINY, progress=False)
 
 
 def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def _first_message(box: str) -> str:
 def _sentence(error: Exception) -> str:
     """An error in one line."""
     if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"cannot use {error.filename}: {error.strerror.lower()}"
+        return f"found that {error.filename} is no use ({error.strerror.lower()}), wanted one that is: give another"
     return " ".join(str(error).split()) or type(error).__name__
 
 

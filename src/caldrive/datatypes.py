@@ -7,7 +7,7 @@ Speeds on signs are the one exception: they are the km/h that stand on the sign.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from enum import Enum
 
 import numpy as np
@@ -202,6 +202,15 @@ class Scenario:
     seed: int = 0
     task: str = ""
     crossing: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("n_vehicles", "n_pedestrians", "seed", "crossing"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}, but must be 0 or more: give a scenario that can be")
+        if not self.time_limit > 0:
+            raise ValueError(f"time_limit is {self.time_limit}, but must be more than 0 s: give it some time")
+        if not all(math.isfinite(value) for pose in (self.start, self.goal) for value in astuple(pose)):
+            raise ValueError(f"start or goal of {self.town} is no place: give x, y and heading as numbers")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +15,16 @@ import pyarrow.parquet as pq
 import simplejpeg
 from numpy.typing import NDArray
 
-from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Scenario
+from caldrive.datatypes import (
+    MAX_VEHICLE_DISTANCE,
+    SPEED_SIGNS,
+    Affordances,
+    Alternative,
+    Command,
+    Control,
+    Image,
+    Scenario,
+)
 from caldrive.episodes import (
     CONTROLS,
     FORMAT_VERSION,
@@ -27,7 +36,17 @@ from caldrive.episodes import (
     EpisodeError,
     Frame,
 )
-from caldrive.scenarios import scenario_from_json
+from caldrive.scenarios import scenario_from_values
+from caldrive.typed import read_json
+
+SHARE, HALF_TURN = (0.0, 1.0), (-math.pi, math.pi)
+RANGES = {  # of what a recorder can write
+    "hazard_stop": SHARE, "red_light": SHARE, "vehicle_distance": (0.0, MAX_VEHICLE_DISTANCE),
+    "relative_angle": HALF_TURN, "other_relative_angle": HALF_TURN,
+    "camera_yaw": HALF_TURN, "frame": (0, math.inf), "camera": (0, math.inf),
+    **{f"{kind}_{name}": SHARE for kind in ("driven", "clean") for name in ("throttle", "brake")},
+    **{f"{kind}_steer": (-1.0, 1.0) for kind in ("driven", "clean")},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -117,9 +136,9 @@ def _header(path: Path, schema: pa.Schema) -> dict[str, Any]:
     metadata = schema.metadata or {}
     if METADATA_KEY not in metadata:
         raise EpisodeError(f"{path} is a Parquet file, but no episode of caldrive: record one with `caldrive collect`")
-    header: dict[str, Any] = json.loads(metadata[METADATA_KEY])
-    if header["version"] != FORMAT_VERSION:
-        found = header["version"]
+    header = read_json(metadata[METADATA_KEY], dict[str, Any])
+    if header.get("version") != FORMAT_VERSION:
+        found = header.get("version")
         raise EpisodeError(f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: record again")
     missing = [name for name in SCHEMA.names if name not in schema.names]
     if missing:
@@ -140,7 +159,7 @@ def read_episode(path: Path | str, semantic: bool = False) -> Episode:
         names = [name for name in names if semantic or name != SEMANTIC.name]
         table = pq.read_table(path, columns=names, memory_map=False, partitioning=None)
         header = _header(path, table.schema)
-        scenario = scenario_from_json(header["scenario"])
+        scenario = scenario_from_values(read_json(header["scenario"], dict[str, Any]))
         table = table.sort_by([("camera", "ascending"), ("frame", "ascending")])
         columns = {name: table[name].to_numpy() for name in SCHEMA.names if name != "image"}
         _check_values(path, table, columns)
@@ -155,8 +174,14 @@ def read_episode(path: Path | str, semantic: bool = False) -> Episode:
 
 def _check_values(path: Path, table: pa.Table, columns: dict[str, NDArray[Any]]) -> None:
     """Raises EpisodeError where rows are missing or hold what no recorder writes."""
-    wrong = [name for name in SCHEMA.names if table[name].null_count]
+    kinds = SCHEMA.append(SEMANTIC)
+    wrong = [
+        name for name in table.column_names if table[name].type != kinds.field(name).type or table[name].null_count
+    ]
     wrong += [name for name, c in columns.items() if c.dtype.kind == "f" and not np.isfinite(c).all()]
+    for name, (low, high) in RANGES.items():
+        wrong += [name] * (not ((columns[name] >= low) & (columns[name] <= high)).all())
+    wrong += ["speed_sign"] * (not set(columns["speed_sign"]) <= {0, *SPEED_SIGNS})
     commands = {command.value for command in Command}
     wrong += ["command"] * (not set(columns["command"]) <= commands)
     wrong += ["other_command"] * (not set(columns["other_command"]) <= commands | {""})

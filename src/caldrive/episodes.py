@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Scenario
 from caldrive.files import write_whole
-from caldrive.scenarios import scenario_to_json
+from caldrive.scenarios import scenario_values
 
 FORMAT_VERSION = 3
 METADATA_KEY = b"caldrive"
@@ -115,7 +115,7 @@ class EpisodeWriter:
         """Write the file. Raises EpisodeError where no frame was appended."""
         if not self._rows:
             raise EpisodeError(f"{self.path} would be an episode without frames: append at least one before closing it")
-        header = {"version": FORMAT_VERSION, "id": self.id, "scenario": scenario_to_json(self.scenario)}
+        header = {"version": FORMAT_VERSION, "id": self.id, "scenario": json.dumps(scenario_values(self.scenario))}
         schema = SCHEMA.append(SEMANTIC) if SEMANTIC.name in self._rows[0] else SCHEMA
         schema = schema.with_metadata({METADATA_KEY: json.dumps(header).encode()})
         columns = [name for name in schema.names if name != "image"]

@@ -73,15 +73,6 @@ def polygon_distance(first: Points, second: Points) -> float:
     return float(min(one.min(), two.min()))
 
 
-def segments_cross(a: Points, b: Points) -> bool:
-    """Whether segment a (2, 2) properly crosses segment b (2, 2)."""
-
-    def side(p: Points, q: Points, r: Points) -> float:
-        return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
-
-    return side(a[0], a[1], b[0]) * side(a[0], a[1], b[1]) < 0 and side(b[0], b[1], a[0]) * side(b[0], b[1], a[1]) < 0
-
-
 @dataclass(frozen=True)
 class Projection:
     """Where a point meets a polyline: s along it (m), left of it (m, + left), and the tangent's heading there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -49,3 +50,10 @@ class EpisodeResult:
     route_length: float
     infractions: tuple[Infraction, ...] = ()
     comfort: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("duration", "distance"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}, but must be 0 or more: look at how it was measured")
+        if not (self.route_length > 0 and math.isfinite(self.route_done)):
+            raise ValueError(f"{self.route_done} m of {self.route_length} m are no part of a route: look at its length")

@@ -1,25 +1,20 @@
-"""A scenario as text: in recordings, results and suites."""
+"""A scenario in JSON's types: in recordings, results and suites."""
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
 from typing import Any
 
-from caldrive.datatypes import Pose, Scenario
+from caldrive.datatypes import Scenario
+from caldrive.typed import as_type
 
 
-def scenario_to_json(scenario: Scenario) -> str:
-    """A scenario as JSON; an infinite time limit becomes null."""
-    values = asdict(scenario)
-    values["time_limit"] = None if math.isinf(scenario.time_limit) else scenario.time_limit
-    return json.dumps(values)
+def scenario_values(scenario: Scenario) -> dict[str, Any]:
+    """A scenario in JSON's types; an infinite time limit becomes null."""
+    return asdict(scenario) | {"time_limit": None if math.isinf(scenario.time_limit) else scenario.time_limit}
 
 
-def scenario_from_json(text: str) -> Scenario:
-    """The inverse of `scenario_to_json`."""
-    values: dict[str, Any] = json.loads(text)
-    values["start"], values["goal"] = Pose(**values["start"]), Pose(**values["goal"])
-    values["time_limit"] = math.inf if values["time_limit"] is None else values["time_limit"]
-    return Scenario(**values)
+def scenario_from_values(values: dict[str, Any]) -> Scenario:
+    """The inverse of `scenario_values`. Raises ValueError for what is no scenario."""
+    return as_type({name: value for name, value in values.items() if (name, value) != ("time_limit", None)}, Scenario)

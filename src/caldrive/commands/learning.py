@@ -40,7 +40,7 @@ class Data(DataSettings, Output):
         from caldrive.driving.tables_seen import recording_table
         from caldrive.perception.recordings import check_recording, draw_histograms
 
-        require_writable_file(self.picture, "--picture")
+        require_writable_file(self.picture, "--picture", ".png")
         found, episodes = check_recording(self.folder, lambda share: progress("checking", share))
         if episodes:
             draw_histograms(episodes, found.counts, self.picture)
@@ -52,18 +52,18 @@ class Data(DataSettings, Output):
 @dataclass(frozen=True)
 class Train(TrainSettings, Output):
     def _config(self) -> TrainingConfig:
+        from caldrive.driving.limits import MOST_SEED, require_within
+
         if self.preset not in TRAININGS:
             raise ValueError(f"found preset {self.preset!r}, wanted one of {', '.join(TRAININGS)}: type --preset small")
-        if self.steps is not None and self.steps < 1:
-            raise ValueError(f"found --steps {self.steps}, wanted at least 1: type --steps 1000")
-        if self.rate is not None and not 0 < self.rate < 1:
-            raise ValueError(f"found --rate {self.rate}, wanted more than 0 and less than 1: type --rate 4e-4")
-        config = TRAININGS[self.preset]
-        return replace(
-            config, seed=self.seed, device=self.device, initial=str(self.initial) if self.initial else None,
-            steps=config.steps if self.steps is None else self.steps,
-            learning_rate=config.learning_rate if self.rate is None else self.rate,
-        )  # fmt: skip
+        usual = TRAININGS[self.preset]
+        steps = usual.steps if self.steps is None else self.steps
+        rate = usual.learning_rate if self.rate is None else self.rate
+        require_within("--steps", steps, 1, 10_000_000, 1000)
+        require_within("--rate", rate, 1e-9, 1.0, 4e-4)
+        require_within("--seed", self.seed, 0, MOST_SEED, 0)
+        initial = str(self.initial) if self.initial else None
+        return replace(usual, seed=self.seed, device=self.device, initial=initial, steps=steps, learning_rate=rate)
 
     def run(self, progress: Progress) -> Answer:
         from caldrive.driving.outputs import require_writable_folder
@@ -95,7 +95,7 @@ class Evaluate(EvaluateSettings, Output):
         from caldrive.perception.report import PAPER, report
 
         if self.worst is not None:
-            require_writable_file(self.worst, "--worst")
+            require_writable_file(self.worst, "--worst", ".png")
         network, info = load_network(model_path(self.model))
         precision = driving_precision(self.precision, info)
         episodes = find_episodes(self.data)

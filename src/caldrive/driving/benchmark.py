@@ -11,17 +11,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from caldrive.driving.cluster import spread_over_cluster
-from caldrive.driving.drivers import controller_config
-from caldrive.driving.ledger import RESULTS, append, claim, held, makings, read_lines, read_run
+from caldrive.driving.cluster import require_ray, spread_over_cluster
+from caldrive.driving.drivers import controller_config, require_agent
+from caldrive.driving.ledger import RESULTS, append, claim, held, provenance, read_lines, read_run
+from caldrive.driving.limits import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.pool import spread
 from caldrive.driving.reuse import driven_elsewhere
 from caldrive.driving.settings import BenchmarkSettings, DriverSettings
 from caldrive.driving.suites import SUITES, Driven, Trial, suite
 from caldrive.driving.trace import result_from_values
-from caldrive.driving.worker import Drive, drive_trial
+from caldrive.driving.worker import TrialRecord, drive_trial
 from caldrive.files import write_whole
+from caldrive.world.towns import load_town
+from caldrive.world.weather import weather
 
 
 def read_results(settings: BenchmarkSettings) -> list[Driven]:
@@ -48,39 +51,54 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[tuple[int, int, bool]]:
     """
     _check(settings)
     trials = suite(settings.suite, settings.seed, settings.time_limit)
+    if settings.suite not in SUITES:
+        _check_places(settings.suite, trials)
     model = settings.model.resolve() if settings.model else None  # workers elsewhere stand in other folders
     driver = DriverSettings(agent=settings.agent, model=model, preset=settings.preset, cap=settings.pace)
     require_writable_folder(settings.out)
+    ours = provenance(driver)  # looks at the network before there is a folder
     with held(settings.out):
-        yield from _benchmark(settings, driver, trials)
+        claim(settings, ours)
+        yield from _benchmark(settings, driver, trials, ours)
 
 
 def _check(settings: BenchmarkSettings) -> None:
     """Refuses what no benchmark can be made of before a folder is claimed."""
-    if settings.workers < 1:
-        raise ValueError(f"found --workers {settings.workers}, wanted 1 or more: type --workers 2")
-    if settings.seed < 0:
-        raise ValueError(f"found --seed {settings.seed}, wanted 0 or more: type --seed 0")
+    require_within("--workers", settings.workers, 1, MOST_WORKERS, 2)
+    require_within("--seed", settings.seed, 0, MOST_SEED, 0)
+    require_agent(settings.agent)
+    for folder in settings.known:
+        read_run(folder)
+    if settings.ray is not None:
+        require_ray()
+    controller_config(settings.preset, settings.pace)
     if settings.suite not in SUITES and (settings.seed, settings.time_limit) != (0, "paper"):
         raise ValueError(
             f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
         )
-    controller_config(settings.preset, settings.pace)
+
+
+def _check_places(suite: str, trials: list[Trial]) -> None:
+    """Refuses towns and weathers that there are not."""
+    for trial in trials:
+        try:
+            weather(trial.scenario.weather)
+            load_town(trial.scenario.town)
+        except (ValueError, OSError) as error:
+            raise ValueError(f"found that {trial.key} in {suite} is nowhere ({error}): change its scenario") from error
 
 
 def _benchmark(
-    settings: BenchmarkSettings, driver: DriverSettings, trials: list[Trial]
+    settings: BenchmarkSettings, driver: DriverSettings, trials: list[Trial], ours: dict[str, Any]
 ) -> Iterator[tuple[int, int, bool]]:
-    claim(settings)
-    ours = makings(driver)
-    for drive in driven_elsewhere(settings.known, _missing(settings, trials), read_run(settings.out)):
-        _keep(settings.out, drive, ours)
+    for record in driven_elsewhere(settings.known, _missing(settings, trials), read_run(settings.out)):
+        _keep(settings.out, record, ours)
     missing = _missing(settings, trials)
     done = len(trials) - len(missing)
-    for _, drive in _workers(settings, partial(drive_trial, driver), missing):
-        _keep(settings.out, drive, ours)
+    for _, record in _workers(settings, partial(drive_trial, driver), missing):
+        _keep(settings.out, record, ours)
         done += 1
-        yield done, len(trials), drive.line["result"]["outcome"] == "success"
+        yield done, len(trials), record.line["result"]["outcome"] == "success"
 
 
 def _missing(settings: BenchmarkSettings, trials: list[Trial]) -> list[Trial]:
@@ -89,22 +107,22 @@ def _missing(settings: BenchmarkSettings, trials: list[Trial]) -> list[Trial]:
 
 
 def _workers(
-    settings: BenchmarkSettings, work: Callable[[Trial], Drive], trials: list[Trial]
-) -> Iterator[tuple[Trial, Drive]]:
+    settings: BenchmarkSettings, work: Callable[[Trial], TrialRecord], trials: list[Trial]
+) -> Iterator[tuple[Trial, TrialRecord]]:
     """The trials as they are done, by processes of this machine or by Ray's."""
     if settings.ray is None:
         return spread(work, trials, settings.workers)
     return spread_over_cluster(work, trials, settings.workers, settings.ray)
 
 
-def _keep(folder: Path, drive: Drive, ours: dict[str, Any]) -> None:
+def _keep(folder: Path, record: TrialRecord, ours: dict[str, Any]) -> None:
     """Writes an episode's files, and last its line. Raises ValueError where a worker drove with something else."""
     for name, value in ours.items():
-        if drive.makings[name] != value:
+        if record.provenance[name] != value:
             raise ValueError(
-                f"found a worker with {name} {drive.makings[name]}, wanted {value}: "
+                f"found a worker with {name} {record.provenance[name]}, wanted {value}: "
                 "install the same caldrive and model on machines of one kind"
             )
-    for name, content in drive.files.items():
+    for name, content in record.files.items():
         write_whole(folder / name, content)
-    append(folder / RESULTS, drive.line)
+    append(folder / RESULTS, record.line)

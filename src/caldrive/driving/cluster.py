@@ -12,7 +12,8 @@ R = TypeVar("R")
 LOCAL = "local"
 
 
-def _ray() -> Any:
+def require_ray() -> Any:
+    """Ray itself. Raises RuntimeError where it is not installed."""
     try:
         import ray
     except ImportError as error:
@@ -46,7 +47,7 @@ def spread_over_cluster(
 
     Raises RuntimeError where Ray is missing or workers die again and again, ValueError where there is no cluster.
     """
-    ray = _ray()
+    ray = require_ray()
     _connect(ray, address, workers)
     try:
         remote = ray.remote(max_retries=MOST_DEATHS, num_cpus=1)(_done)

@@ -21,6 +21,7 @@ from caldrive.control.controller import Controller
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.disturbance import Disturbance, LateStart
+from caldrive.driving.limits import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.pool import spread
 from caldrive.driving.starts import starting_place
 from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
@@ -156,16 +157,14 @@ def _record(config: CollectConfig, folder: Path, number: int) -> int:
 
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
-    least = {
-        "episodes": 1, "duration": 0.1, "cars": 0, "people": 0, "width": 16, "height": 16, "seed": 0,
-        "rearranged": 0.0, "workers": 1,
+    limits = {
+        "episodes": (1, 100_000), "duration": (0.1, 3600.0), "cars": (0, math.inf), "people": (0, math.inf),
+        "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS), "seed": (0, MOST_SEED), "rearranged": (0.0, 1.0),
+        "workers": (1, MOST_WORKERS),
     }  # fmt: skip
-    asked = asdict(config) | {"workers": workers}
-    for name, low in least.items():
-        if not asked[name] >= low:
-            raise ValueError(f"found --{name} {asked[name]}, wanted at least {low}: type --{name} {low}")
-    if not config.rearranged <= 1:
-        raise ValueError(f"found --rearranged {config.rearranged:g}, wanted at most 1: type --rearranged 1")
+    asked, usual = asdict(config) | {"workers": workers}, asdict(CollectConfig()) | {"workers": 2}
+    for name, (low, high) in limits.items():
+        require_within(f"--{name}", asked[name], low, high, usual[name])
     if not config.weathers:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 3 1 6 8")
     for number in config.weathers:

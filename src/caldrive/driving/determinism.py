@@ -28,7 +28,7 @@ def step_digests(step: Step) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Run:
+class Digests:
     """One process's episode: the digests of each step, and that of the result."""
 
     steps: tuple[tuple[str, ...], ...]
@@ -48,7 +48,7 @@ class Comparison:
         return not self.difference
 
 
-def drive_and_digest(settings: DeterminismSettings) -> Run:
+def drive_and_digest(settings: DeterminismSettings) -> Digests:
     """Drive the scenario in this process, with the camera on."""
     from caldrive.driving.drivers import chosen_scenarios, set_up
     from caldrive.driving.rollout import run_episode
@@ -58,10 +58,10 @@ def drive_and_digest(settings: DeterminismSettings) -> Run:
     steps: list[tuple[str, ...]] = []
     with closing(world):
         result = run_episode(world, agent, scenario, lambda step: steps.append(step_digests(step)))
-    return Run(tuple(steps), digest(result))
+    return Digests(tuple(steps), digest(result))
 
 
-def compare(first: Run, second: Run, dt: float = 0.1) -> Comparison:
+def compare(first: Digests, second: Digests, dt: float = 0.1) -> Comparison:
     """Equal, or the first step that differs and in what."""
     whole = hashlib.sha256(repr(first).encode()).hexdigest()
     for i, (one, other) in enumerate(zip_longest(first.steps, second.steps)):

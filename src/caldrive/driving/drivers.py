@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from caldrive.control.controller import Controller
 from caldrive.control.presets import DEFAULT, PAPER
 from caldrive.datatypes import Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.driving.limits import MOST_SEED, require_within
 from caldrive.driving.settings import DriverSettings
 from caldrive.driving.tasks import scenarios
 from caldrive.world.embedded import EmbeddedWorld
@@ -29,12 +31,18 @@ def model_path(model: Path | None) -> Path:
     return model or SHIPPED_MODEL
 
 
+def require_agent(name: str) -> None:
+    """Raises ValueError for an unknown agent."""
+    if name not in AGENTS:
+        raise ValueError(f"found agent {name!r}, wanted one of {', '.join(AGENTS)}: type --agent oracle")
+
+
 def controller_config(preset: str, cap: float | None) -> ControlConfig:
-    """A preset by name, with a cap in km/h. Raises ValueError for an unknown preset or a cap that is not positive."""
+    """A preset by name, with a cap in km/h. Raises ValueError for an unknown preset or a cap that cannot be."""
     if preset not in PRESETS:
         raise ValueError(f"found preset {preset!r}, wanted one of {', '.join(PRESETS)}: type --preset default")
-    if cap is not None and not cap > 0:
-        raise ValueError(f"found a cap of {cap:g} km/h, wanted more than 0: type --cap 20")
+    if cap is not None:
+        require_within("--cap", cap, 1.0, 200.0, 20)
     return replace(PRESETS[preset], cap=cap)
 
 
@@ -59,8 +67,7 @@ def set_up(settings: DriverSettings, images: bool = False) -> tuple[EmbeddedWorl
 
     Raises ValueError for an unknown agent or preset, FileNotFoundError or ValueError for a model that is no use.
     """
-    if settings.agent not in AGENTS:
-        raise ValueError(f"found agent {settings.agent!r}, wanted one of {', '.join(AGENTS)}: type --agent oracle")
+    require_agent(settings.agent)
     config = controller_config(settings.preset, settings.cap)
     if settings.agent == "oracle":
         return oracle(CameraConfig() if images else None, config)
@@ -68,20 +75,23 @@ def set_up(settings: DriverSettings, images: bool = False) -> tuple[EmbeddedWorl
     return EmbeddedWorld(camera), agent
 
 
+def _check(settings: DriverSettings, n: int) -> None:
+    for option, number in (("--cars", settings.cars), ("--people", settings.people)):
+        if number is not None:
+            require_within(option, number, 0, math.inf, 0)
+    require_within("--episodes", n, 1, 100_000, 1)
+    require_within("--seed", settings.seed, 0, MOST_SEED, 0)
+    if settings.seconds is not None:
+        require_within("--seconds", settings.seconds, 0.1, math.inf, 60)
+
+
 def chosen_scenarios(settings: DriverSettings, n: int) -> list[Scenario]:
     """n of the task's scenarios, from settings.route on. Raises ValueError for figures that cannot be."""
-    for name, value, least in (("cars", settings.cars, 0), ("people", settings.people, 0), ("episodes", n, 1)):
-        if value is not None and value < least:
-            raise ValueError(f"found --{name} {value}, wanted {least} or more: type --{name} {least}")
-    if settings.seed < 0:
-        raise ValueError(f"found --seed {settings.seed}, wanted 0 or more: type --seed 0")
-    if settings.seconds is not None and not settings.seconds > 0:
-        raise ValueError(f"found --seconds {settings.seconds:g}, wanted more than 0: type --seconds 60")
+    _check(settings, n)
     found = scenarios(
         settings.town, settings.task, settings.weather, cars=settings.cars, people=settings.people, seed=settings.seed
     )
-    if not 0 <= settings.route < len(found):
-        raise ValueError(f"found --route {settings.route}, wanted 0 to {len(found) - 1}: type --route 0")
+    require_within("--route", settings.route, 0, len(found) - 1, 0)
     chosen = [found[(settings.route + k) % len(found)] for k in range(n)]
     if settings.seconds is None:
         return chosen

@@ -17,8 +17,12 @@ def require_writable_folder(folder: Path, option: str = "--out") -> None:
         )
 
 
-def require_writable_file(path: Path, option: str) -> None:
-    """Raises OSError where a file cannot be written under that name. option: what named it."""
+def require_writable_file(path: Path, option: str, ending: str) -> None:
+    """Raises ValueError where the name has another ending, by which a picture could take a recording's place, OSError
+    where a file cannot be written under it. option: what named it."""
+    if path.suffix.lower() != ending:
+        said = f"{option} {path.with_suffix(ending) if path.name else path / f'NAME{ending}'}"
+        raise ValueError(f"found {option} {path}, wanted a name that ends in {ending}: type {said}")
     if path.is_dir():
         raise OSError(f"found that {path} is a folder, wanted the name of a file: type {option} {path / 'NAME'}")
     require_writable_folder(path.parent, option)

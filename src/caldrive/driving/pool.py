@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context, parent_process
+from signal import SIG_DFL, SIGINT, signal
 from threading import Thread
 from typing import TypeVar
 
@@ -16,7 +17,9 @@ MOST_DEATHS = 3  # of workers, one after the other, while nothing gets done
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed would wait for work forever, and keep its memory."""
+    """A worker whose parent was killed would wait for work forever, and keep its memory. Ctrl-C ends it without a
+    word: the parent has them."""
+    signal(SIGINT, SIG_DFL)
     parent = parent_process()
     assert parent is not None
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from caldrive.driving.suites import CONDITIONS
 from caldrive.driving.tasks import TASKS
 from caldrive.results import InfractionKind
 
 SYSTEMS = ("MP", "CIL", "RL", "CAL")
-CONDITIONS = ("training", "new weather", "new town", "new town + weather")
-# Percent of episodes: straight, one turn, navigation, navigation dynamic; a row for each of CONDITIONS.
+_ROWS = tuple(CONDITIONS)
+# Percent of episodes: straight, one turn, navigation, navigation dynamic; a row for each condition.
 _SUCCESS = {
     "MP": ((98, 82, 80, 77), (100, 95, 94, 89), (92, 61, 24, 24), (50, 50, 47, 44)),
     "CIL": ((95, 89, 86, 83), (98, 90, 84, 82), (97, 59, 40, 38), (80, 48, 44, 42)),
@@ -35,11 +36,11 @@ def success(system: str, condition: str, task: str) -> int | None:
     """Percent of a system's episodes that reached their goal; None where the paper says nothing."""
     if system not in _SUCCESS or condition not in CONDITIONS or task not in TASKS:
         return None
-    return _SUCCESS[system][CONDITIONS.index(condition)][TASKS.index(task)]
+    return _SUCCESS[system][_ROWS.index(condition)][TASKS.index(task)]
 
 
 def km_between(system: str, condition: str, kind: InfractionKind) -> str:
     """Kilometres between two infractions, as printed; empty where the paper says nothing."""
     if system not in SYSTEMS or condition not in CONDITIONS or kind not in _KM:
         return ""
-    return _KM[kind].split(" | ")[CONDITIONS.index(condition)].split()[SYSTEMS.index(system)]
+    return _KM[kind].split(" | ")[_ROWS.index(condition)].split()[SYSTEMS.index(system)]

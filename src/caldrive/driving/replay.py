@@ -12,7 +12,7 @@ from caldrive.datatypes import Step
 from caldrive.driving.benchmark import driven
 from caldrive.driving.drivers import set_up
 from caldrive.driving.film import EpisodeFilm, caption
-from caldrive.driving.ledger import RESULTS, read_lines, read_run
+from caldrive.driving.ledger import RESULTS, read_lines, read_run, require_same_suite
 from caldrive.driving.outputs import require_writable_file
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
@@ -45,11 +45,12 @@ def replay(folder: Path, key: str, out: Path, progress: Progress = silent) -> Re
 
     Raises ValueError where there is no such run or episode.
     """
+    require_writable_file(out, "--out", ".mp4")
     run = read_run(folder)
+    require_same_suite(run)
     trial, known = _trial(run, key), read_lines(folder / RESULTS)
     if key in known:
         driven(trial, known[key])  # refuses another episode of this name
-    require_writable_file(out, "--out")
     model = Path(run["model_file"]) if run["model_file"] else None
     world, agent = set_up(DriverSettings(agent=run["agent"], model=model, preset=run["preset"], cap=run["cap"]))
     with closing(world), VideoWriter(out, rate=1 / world.dt) as video:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from caldrive.driving.benchmark import read_results
 from caldrive.driving.causes import Cause, cause
-from caldrive.driving.ledger import read_run
+from caldrive.driving.ledger import read_run, require_same_suite
 from caldrive.driving.settings import BenchmarkSettings
 from caldrive.driving.suites import Driven
 from caldrive.driving.witness import read_trace
@@ -20,7 +20,7 @@ UNITS = {"vehicle_distance": "m", "relative_angle": "rad", "center_distance": "m
 
 
 @dataclass(frozen=True)
-class Run:
+class BenchmarkRun:
     """One folder: its name in the report, its description, and its episodes."""
 
     name: str
@@ -31,6 +31,19 @@ class Run:
     def only(self, condition: str) -> list[Driven]:
         """The episodes of one condition."""
         return [one for one in self.driven if one.trial.condition == condition]
+
+    @cached_property
+    def failures(self) -> tuple[Failure, ...]:
+        """The episodes that missed their goal or broke a rule, in the suite's order."""
+        missed = (Outcome.TIMEOUT, Outcome.ABORTED)  # where an infraction ended the episode, it is the cause
+        return tuple(
+            Failure(
+                self.name, one, tuple(_before(one, k) for k in range(len(one.result.infractions))),
+                _cause(self.folder, one) if one.result.outcome in missed else None,
+            )
+            for one in self.driven
+            if one.result.outcome is not Outcome.SUCCESS or any(i.at_fault for i in one.result.infractions)
+        )  # fmt: skip
 
     @property
     def command(self) -> str:
@@ -44,9 +57,10 @@ class Run:
         return " ".join([*words, "--out DIR"])
 
 
-def load_run(folder: Path) -> Run:
+def load_run(folder: Path) -> BenchmarkRun:
     """Reads a benchmark's folder. Raises ValueError where there is none, or nothing in it."""
     about = read_run(folder)
+    require_same_suite(about)
     settings = BenchmarkSettings(
         suite=about["suite"], agent=about["agent"], out=folder, seed=about["seed"], time_limit=about["time_limit"]
     )
@@ -55,10 +69,10 @@ def load_run(folder: Path) -> Run:
         raise ValueError(f"found no episode in {folder}, wanted some: type caldrive benchmark --out {folder}")
     if not all("turning" in one.result.comfort and "reds_obeyed" in one.figures for one in driven):
         raise ValueError(f"found results of an older caldrive in {folder}: type caldrive benchmark --out ANOTHER")
-    return Run(about["agent"], folder, about, tuple(driven))
+    return BenchmarkRun(about["agent"], folder, about, tuple(driven))
 
 
-def load_runs(folders: Sequence[Path]) -> list[Run]:
+def load_runs(folders: Sequence[Path]) -> list[BenchmarkRun]:
     """All folders; runs of one agent are told apart by their folders. Raises ValueError for one that is given twice."""
     if len({folder.resolve() for folder in folders}) < len(folders):
         raise ValueError("found a folder twice, wanted each once: leave one of them out")
@@ -78,7 +92,7 @@ def _apart(folder: Path, folders: Sequence[Path]) -> str:
     return "/".join(own[-length:])
 
 
-def conditions(runs: Sequence[Run]) -> list[str]:
+def conditions(runs: Sequence[BenchmarkRun]) -> list[str]:
     """All conditions in the order in which they first appear."""
     return list(dict.fromkeys(one.trial.condition for run in runs for one in run.driven))
 
@@ -94,25 +108,13 @@ class Failure:
     cause: Cause | None = None
 
 
-def failures(runs: Sequence[Run]) -> list[Failure]:
-    """All of them, in the suites' order."""
-    return [
-        Failure(run.name, one, tuple(_before(one, k) for k in range(len(one.result.infractions))), _cause(run, one))
-        for run in runs
-        for one in run.driven
-        if one.result.outcome is not Outcome.SUCCESS or any(i.at_fault for i in one.result.infractions)
-    ]
+def failures(runs: Sequence[BenchmarkRun]) -> list[Failure]:
+    """Those of all runs."""
+    return [one for run in runs for one in run.failures]
 
 
-def _cause(run: Run, one: Driven) -> Cause | None:
-    """How a missed goal began; where an infraction ended the episode, it is the cause."""
-    missed = one.result.outcome not in (Outcome.SUCCESS, Outcome.FAILED)
-    return _began(run.folder, one.trial.key) if missed else None
-
-
-@lru_cache(maxsize=8192)  # every part of a report asks
-def _began(folder: Path, key: str) -> Cause | None:
-    trace = read_trace(folder, key)
+def _cause(folder: Path, one: Driven) -> Cause | None:
+    trace = read_trace(folder, one.trial.key)
     return cause(trace) if trace else None
 
 

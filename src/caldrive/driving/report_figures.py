@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from caldrive.config import KMH
 from caldrive.driving.measures import cells
 from caldrive.driving.published import SYSTEMS, success
-from caldrive.driving.report import Run
+from caldrive.driving.report import BenchmarkRun
 from caldrive.driving.witness import read_trace
 from caldrive.results import InfractionKind
 from caldrive.world.towns import load_town
@@ -37,7 +37,7 @@ def svg(figure: Figure) -> str:
     return text[text.index("<svg") :]
 
 
-def success_figure(runs: Sequence[Run]) -> str:
+def success_figure(runs: Sequence[BenchmarkRun]) -> str:
     """Success in each cell with its interval, and the paper's systems as marks."""
     figure = Figure(figsize=(12, 4.2), layout="constrained")
     ax = figure.subplots()
@@ -61,7 +61,7 @@ def success_figure(runs: Sequence[Run]) -> str:
     return svg(figure)
 
 
-def map_figure(runs: Sequence[Run], town: str) -> str:
+def map_figure(runs: Sequence[BenchmarkRun], town: str) -> str:
     """Where in a town infractions happened; others' faults are hollow."""
     figure = Figure(figsize=(7, 6), layout="constrained")
     ax = figure.subplots()
@@ -91,7 +91,7 @@ def _legend(ax: Axes) -> None:
         ax.legend(fontsize=8)
 
 
-def traces(run: Run) -> Iterator[dict[str, list[Any]]]:
+def traces(run: BenchmarkRun) -> Iterator[dict[str, list[Any]]]:
     """The columns of all episodes whose traces lie in a run's folder."""
     for one in run.driven:
         columns = read_trace(run.folder, one.trial.key)
@@ -108,7 +108,7 @@ def _error_sums(columns: dict[str, list[Any]], name: str) -> NDArray[np.float64]
     return np.stack([np.bincount(slot[known], weight, SLOTS) for weight in (np.ones_like(wrong), wrong)])
 
 
-def errors_figure(runs: Sequence[Run]) -> str:
+def errors_figure(runs: Sequence[BenchmarkRun]) -> str:
     """Mean absolute error of the continuous affordances over the time since the start."""
     figure = Figure(figsize=(12, 3.2), layout="constrained")
     axes = figure.subplots(1, len(SHOWN))
@@ -127,7 +127,7 @@ def errors_figure(runs: Sequence[Run]) -> str:
     return svg(figure)
 
 
-def speed_figure(runs: Sequence[Run]) -> str:
+def speed_figure(runs: Sequence[BenchmarkRun]) -> str:
     """Speed over distance in the longest episode that all agents drove."""
     keys = set.intersection(*({one.trial.key for one in run.driven} for run in runs))
     longest = max(

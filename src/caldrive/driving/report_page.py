@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from caldrive.driving.report import Failure, Run, failures
+from caldrive.driving.report import BenchmarkRun, Failure, failures
 from caldrive.driving.report_figures import errors_figure, map_figure, speed_figure, success_figure
 from caldrive.driving.report_tables import Table, tables
 from caldrive.driving.witness import still_paths
@@ -17,7 +17,7 @@ _DATA = Path(__file__).parent / "data"
 MOST_STILLS = 400  # on one page; beyond that it would take too long to open
 
 
-def report_page(runs: Sequence[Run]) -> str:
+def report_page(runs: Sequence[BenchmarkRun]) -> str:
     """The whole page."""
     style, script = ((_DATA / name).read_text() for name in ("report.css", "report.js"))
     towns = list(dict.fromkeys(one.trial.scenario.town for run in runs for one in run.driven))
@@ -49,7 +49,7 @@ def _table(table: Table) -> str:
     )
 
 
-def _failures(runs: Sequence[Run]) -> str:
+def _failures(runs: Sequence[BenchmarkRun]) -> str:
     found, folders = failures(runs), {run.name: run.folder for run in runs}
     kinds = sorted({i.kind.value for one in found for i in one.episode.result.infractions})
     choices = {

@@ -9,7 +9,7 @@ from pathlib import Path
 from caldrive.driving.causes import common_places
 from caldrive.driving.measures import cells, comfort, errors, rates, reds
 from caldrive.driving.published import COMFORT, SYSTEMS, km_between, success
-from caldrive.driving.report import UNITS, Run, conditions, failures
+from caldrive.driving.report import UNITS, BenchmarkRun, conditions, failures
 from caldrive.driving.suites import Driven
 
 DYNAMIC, ALL = "navigation-dynamic", "all"  # tasks whose infractions are counted together
@@ -25,14 +25,14 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def tables(runs: Sequence[Run]) -> list[Table]:
+def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
     """All tables of the report."""
     return [
         _about(runs), _success(runs), _infractions(runs), _lights(runs), _comfort(runs), _errors(runs), _causes(runs)
     ]  # fmt: skip
 
 
-def _about(runs: Sequence[Run]) -> Table:
+def _about(runs: Sequence[BenchmarkRun]) -> Table:
     rows = [
         (
             run.name, run.about["suite"], str(len(run.driven)), str(run.about["model"] or ""), run.about["code"],
@@ -44,7 +44,7 @@ def _about(runs: Sequence[Run]) -> Table:
     return Table("Runs", "What drove, and what to type to see it again.", head, tuple(rows))
 
 
-def _success(runs: Sequence[Run]) -> Table:
+def _success(runs: Sequence[BenchmarkRun]) -> Table:
     found = {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.driven)}
     rows = []
     for condition, task in dict.fromkeys(key[1:] for key in found):
@@ -74,7 +74,7 @@ def _success(runs: Sequence[Run]) -> Table:
     return Table("Success", text, head, tuple(rows))
 
 
-def _infractions(runs: Sequence[Run]) -> Table:
+def _infractions(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for condition in conditions(runs):
         for tasks in (DYNAMIC, ALL):
@@ -98,7 +98,7 @@ def _among(one: Driven, tasks: str) -> bool:
     return tasks == ALL or one.trial.scenario.task == tasks
 
 
-def _lights(runs: Sequence[Run]) -> Table:
+def _lights(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for condition in conditions(runs):
         for run in runs:
@@ -109,7 +109,7 @@ def _lights(runs: Sequence[Run]) -> Table:
     return Table("Red lights", text, ("condition", "agent", "met", "obeyed", "%"), tuple(rows))
 
 
-def _comfort(runs: Sequence[Run]) -> Table:
+def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
     names = {
         "center_distance": "centre distance, median m", "jerk": "jerk m/s³", "lateral_straight": "lateral, straight",
         "lateral_turn": "lateral, turns", "comfortable": "in nuPlan's bounds %",
@@ -125,7 +125,7 @@ def _comfort(runs: Sequence[Run]) -> Table:
     return Table("Driving behaviour", text, ("agent", "condition", *names.values()), tuple(rows))
 
 
-def _errors(runs: Sequence[Run]) -> Table:
+def _errors(runs: Sequence[BenchmarkRun]) -> Table:
     rows: list[tuple[str, ...]] = []
     heads: tuple[str, ...] = ()
     for run in runs:
@@ -139,7 +139,7 @@ def _errors(runs: Sequence[Run]) -> Table:
     return Table("Affordances while driving", text, ("agent", "condition", *heads), tuple(rows))
 
 
-def _causes(runs: Sequence[Run]) -> Table:
+def _causes(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     found = failures(runs)
     for run in runs:

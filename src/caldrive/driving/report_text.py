@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from caldrive.driving.report import Run, failures
+from caldrive.driving.report import BenchmarkRun, failures
 from caldrive.driving.report_tables import tables
 
 
-def report_text(runs: Sequence[Run]) -> str:
+def report_text(runs: Sequence[BenchmarkRun]) -> str:
     """The report as Markdown."""
     parts, found = ["# Benchmark", ""], failures(runs)
     for table in tables(runs):

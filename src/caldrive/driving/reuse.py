@@ -14,13 +14,13 @@ from caldrive.driving.ledger import RESULTS, read_lines, read_run
 from caldrive.driving.suites import Trial
 from caldrive.driving.trace import json_line, result_from_values
 from caldrive.driving.witness import episode_values, still_paths, trace_path
-from caldrive.driving.worker import Drive
+from caldrive.driving.worker import TrialRecord
 from caldrive.results import EpisodeResult, Outcome
 
 DRIVEN_BY = ("agent", "cap", "preset", "code", "model", "precision")
 
 
-def driven_elsewhere(folders: Sequence[Path], trials: Sequence[Trial], wanted: dict[str, Any]) -> Iterator[Drive]:
+def driven_elsewhere(folders: Sequence[Path], trials: Sequence[Trial], wanted: dict[str, Any]) -> Iterator[TrialRecord]:
     """What driving would give, of those trials that are in other benchmarks' folders under any name.
 
     wanted: what the folders' runs must have been driven by, at least `DRIVEN_BY`. Raises ValueError where they were
@@ -40,7 +40,7 @@ def driven_elsewhere(folders: Sequence[Path], trials: Sequence[Trial], wanted: d
             trial = left.get(_nameless(result.scenario))
             if trial and _ends_the_same(result, trial) and trace_path(folder, line["key"]).is_file():
                 del left[_nameless(trial.scenario)]
-                yield Drive(_renamed(line, trial), _files(folder, line, trial), wanted)
+                yield TrialRecord(_renamed(line, trial), _files(folder, line, trial), wanted)
 
 
 def _nameless(scenario: Scenario) -> Scenario:

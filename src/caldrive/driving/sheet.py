@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PIL import Image as Picture
 
+from caldrive.driving.limits import MOST_PIXELS, require_within
 from caldrive.driving.outputs import require_writable_file
 from caldrive.files import write_whole
 
@@ -17,15 +18,10 @@ def write_sheet(town: str, path: Path, width: int | None = None, looks: int = 0)
 
     Raises ValueError, FileNotFoundError or OSError for an unknown town, a name that is no .png, a locked door.
     """
-    if path.suffix.lower() != ".png":
-        raise ValueError(
-            f"found --sheet {path}, wanted a name that ends in .png: type --sheet {path.with_suffix('.png')}"
-        )
-    if width is not None and not 16 <= width <= 16384:
-        raise ValueError(f"found --width {width}, wanted 16 to 16384 pixels: type --width 1920")
-    if not 0 <= looks <= 100:
-        raise ValueError(f"found --looks {looks}, wanted 0 to 100: type --looks 8")
-    require_writable_file(path, "--sheet")
+    require_writable_file(path, "--sheet", ".png")
+    if width is not None:
+        require_within("--width", width, 16, 4 * MOST_PIXELS, 1920)
+    require_within("--looks", looks, 0, 100, 8)
     from caldrive.world.sheet import contact_sheet
 
     picture = Picture.fromarray(contact_sheet(town, looks=looks))

@@ -18,10 +18,11 @@ import numpy as np
 
 from caldrive.config import KMH, CameraConfig, ControlConfig
 from caldrive.datatypes import Command, Observation, Scenario
+from caldrive.driving.limits import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.settings import AgentSpeedSettings, Progress, WorldSpeedSettings, silent
 
 PACE = 30.0  # km/h that the car under measurement drives at most
-WARM_UP = 20  # steps that do not count
+WARM_UP, MOST_STEPS = 20, 100_000  # steps that do not count, and those that one may ask for
 
 
 class Stopwatch:
@@ -70,6 +71,10 @@ class WorldSpeed:
 
 def measure_world(settings: WorldSpeedSettings, progress: Progress = silent) -> WorldSpeed:
     """Drive along a random route with the camera on. Raises ValueError as the world's reset does."""
+    require_within("--steps", settings.steps, 1, MOST_STEPS, 600)
+    require_within("--cars", settings.cars, 0, math.inf, 20)
+    require_within("--people", settings.people, 0, math.inf, 50)
+    require_within("--seed", settings.seed, 0, MOST_SEED, 0)
     begin = perf_counter()
     from caldrive.driving.drivers import oracle
 
@@ -98,8 +103,6 @@ def _start(world: Any, settings: WorldSpeedSettings) -> Observation:
     from caldrive.world.route import random_route
     from caldrive.world.weather import weather
 
-    if settings.steps < 1:
-        raise ValueError(f"found --steps {settings.steps}, wanted 1 or more: type --steps 600")
     weather(settings.weather)
     roads, rng = world.enter(settings.town), np.random.default_rng(settings.seed)
     length = (settings.steps + WARM_UP) * world.dt * PACE * KMH + 50.0
@@ -141,11 +144,12 @@ class AgentSpeed:
 
 def measure_agent(settings: AgentSpeedSettings, progress: Progress = silent) -> AgentSpeed:
     """Run perception and controller on images of noise: how long they take does not depend on what they show."""
-    if settings.steps < 1:
-        raise ValueError(f"found --steps {settings.steps}, wanted 1 or more: type --steps 300")
+    require_within("--steps", settings.steps, 1, MOST_STEPS, 300)
+    threads = os.cpu_count() or 1 if settings.threads is None else settings.threads
+    require_within("--threads", threads, 1, MOST_WORKERS, 2)
     from caldrive.driving.drivers import network_agent
 
-    agent, camera = network_agent(settings.model, ControlConfig(), settings.threads or os.cpu_count() or 1)
+    agent, camera = network_agent(settings.model, ControlConfig(), threads)
     agent.reset()
     rng, took = np.random.default_rng(0), []
     for i in range(WARM_UP + settings.steps):

@@ -11,12 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 from caldrive.datatypes import Scenario
 from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, scenarios
 from caldrive.results import EpisodeResult, InfractionKind
-from caldrive.scenarios import scenario_from_json, scenario_to_json
+from caldrive.scenarios import scenario_from_values, scenario_values
+from caldrive.typed import read_json
 
 TRAINING_WEATHERS, NEW_WEATHERS = (1, 3, 6, 8), (4, 14)
 CONDITIONS = {
@@ -127,16 +128,25 @@ def to_json(trials: list[Trial]) -> str:
     rows = [
         {
             "key": one.key, "condition": one.condition, "fatal": [kind.value for kind in one.fatal],
-            "scenario": json.loads(scenario_to_json(one.scenario)),
+            "scenario": scenario_values(one.scenario),
         }
         for one in trials
     ]  # fmt: skip
     return json.dumps(rows, indent=1)
 
 
-def _key(value: Any) -> str:
+class _Row(TypedDict):
+    """A trial as `to_json` writes it."""
+
+    key: str
+    condition: str
+    scenario: dict[str, Any]
+    fatal: NotRequired[tuple[InfractionKind, ...]]
+
+
+def _key(value: str) -> str:
     """A trial's key, which names files."""
-    if not isinstance(value, str) or not re.fullmatch(r"\w[\w.-]{0,99}", value, re.ASCII):
+    if not re.fullmatch(r"\w[\w.-]{0,99}", value, re.ASCII):
         raise ValueError(f"found key {value!r}, wanted letters, digits, -, _ and .")
     return value
 
@@ -147,13 +157,10 @@ def from_json(path: Path) -> list[Trial]:
         raise ValueError(f"found no suite {path}, wanted a JSON file: look for the name, or type --suite quick")
     try:
         trials = [
-            Trial(
-                _key(row["key"]), str(row["condition"]), scenario_from_json(json.dumps(row["scenario"])),
-                tuple(InfractionKind(kind) for kind in row.get("fatal", ())),
-            )
-            for row in json.loads(path.read_text())
-        ]  # fmt: skip
-    except (ValueError, KeyError, TypeError) as error:
+            Trial(_key(row["key"]), row["condition"], scenario_from_values(row["scenario"]), row.get("fatal", ()))
+            for row in read_json(path.read_bytes(), list[_Row])
+        ]
+    except ValueError as error:
         raise ValueError(
             f"found that {path} is no suite ({error}), wanted a list of key, condition, scenario: see suites.to_json"
         ) from error

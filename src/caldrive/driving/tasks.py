@@ -79,6 +79,12 @@ def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
     return draw_routes(load_town(town), kind, ROUTES_PER_TASK, np.random.default_rng(seed))
 
 
+@lru_cache(maxsize=4096)  # the same in all weathers
+def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
+    route = plan_route(load_town(town), start, goal)
+    return route.time_limit if kind == "paper" else route.length / (5 * KMH) + 10
+
+
 def scenarios(
     town: str,
     task: str,
@@ -102,8 +108,7 @@ def scenarios(
     n_cars, n_people = usual[0] if cars is None else cars, usual[1] if people is None else people
     found = []
     for i, (start, goal) in enumerate(routes(town, task, seed)):
-        route = plan_route(load_town(town), start, goal)
-        limit = route.time_limit if time_limit == "paper" else route.length / (5 * KMH) + 10
+        limit = _time_limit(town, start, goal, time_limit)
         found.append(Scenario(town, weather, start, goal, n_cars, n_people, limit, seed * 1000 + i, name or task))
     return found
 

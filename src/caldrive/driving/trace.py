@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, fields
+from typing import Any, Literal, TypedDict
 
 from caldrive.config import KMH
-from caldrive.datatypes import Step
-from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
-from caldrive.scenarios import scenario_from_json, scenario_to_json
+from caldrive.datatypes import Affordances, Step
+from caldrive.results import EpisodeResult, Infraction, Outcome
+from caldrive.scenarios import scenario_from_values, scenario_values
+from caldrive.typed import as_type
 
 TRACE_VERSION = 1
 DIGITS = 4
+COLUMNS = (  # what a benchmark's trace has at least
+    "time", "x", "y", "speed", "command", "route_done", "road_limit", "state", "speed_limit",
+    *(f"{kind}_{one.name}" for kind in ("predicted", "true") for one in fields(Affordances)),
+)  # fmt: skip
 
 
 def plain(value: Any) -> Any:
@@ -57,22 +62,34 @@ def mean_speed(result: EpisodeResult) -> float:
     return result.distance / result.duration / KMH if result.duration > 0 else 0.0
 
 
-def result_from_values(values: dict[str, Any]) -> EpisodeResult:
-    """The inverse of `result_values`, up to its rounding."""
-    broken = [Infraction(**one | {"kind": InfractionKind(one["kind"])}) for one in values["infractions"]]
-    names = ("duration", "distance", "route_done", "route_length")
-    figures = {name: math.inf if values[name] is None else values[name] for name in names}
-    scenario = scenario_from_json(json.dumps(values["scenario"]))
+class _Result(TypedDict):
+    """What `result_values` writes and is needed to make a result again."""
+
+    scenario: dict[str, Any]
+    outcome: Literal["success", "timeout", "failed", "aborted"]
+    duration: float
+    distance: float
+    route_done: float
+    route_length: float | None
+    infractions: tuple[Infraction, ...]
+    comfort: dict[str, float]
+
+
+def result_from_values(values: Any) -> EpisodeResult:
+    """The inverse of `result_values`, up to its rounding. Raises ValueError for what is no result."""
+    found = as_type(values, _Result)
+    length = math.inf if found["route_length"] is None else found["route_length"]
     return EpisodeResult(
-        scenario, Outcome[values["outcome"].upper()], **figures, infractions=tuple(broken), comfort=values["comfort"]
-    )
+        scenario_from_values(found["scenario"]), Outcome[found["outcome"].upper()], found["duration"],
+        found["distance"], found["route_done"], length, found["infractions"], found["comfort"],
+    )  # fmt: skip
 
 
 def result_values(result: EpisodeResult) -> dict[str, Any]:
     """An EpisodeResult in JSON's types; mean_speed in km/h."""
     broken = [asdict(one) | {"kind": one.kind.value} for one in result.infractions]
     return {
-        "scenario": json.loads(scenario_to_json(result.scenario)),
+        "scenario": scenario_values(result.scenario),
         "outcome": result.outcome.name.lower(),
         "message": result.outcome.value,
         "infractions": [{name: plain(value) for name, value in one.items()} for one in broken],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +13,9 @@ import simplejpeg
 from caldrive.config import CameraConfig
 from caldrive.datatypes import Image, Step
 from caldrive.driving.referee import Referee
-from caldrive.driving.trace import Trace, episode_json
+from caldrive.driving.trace import COLUMNS, Trace, episode_json
 from caldrive.results import EpisodeResult, Outcome
+from caldrive.typed import as_type, read_json
 from caldrive.world.embedded import EmbeddedWorld
 
 STILL = replace(CameraConfig(), width=480, height=212)
@@ -34,10 +34,18 @@ def read_trace(folder: Path, key: str) -> dict[str, list[Any]] | None:
 
 def episode_values(path: Path) -> dict[str, Any]:
     """What a trace's file holds, `trace` at least. Raises ValueError where it is damaged."""
+    content = path.read_bytes()
     try:
-        found = dict(json.loads(gzip.decompress(path.read_bytes())))
-        return found | {"trace": dict(found["trace"])}
-    except (OSError, EOFError, zlib.error, ValueError, TypeError, KeyError) as error:
+        found = read_json(gzip.decompress(content), dict[str, Any])
+        columns = as_type(found.get("trace"), dict[str, list[Any]])
+        if missing := [name for name in COLUMNS if name not in columns]:
+            raise ValueError(f"it lacks {missing[0]}")
+        if len(set(map(len, columns.values()))) != 1 or not columns["time"]:
+            raise ValueError("its columns are empty or of different lengths")
+        for name in ("time", "x", "y", "speed", "route_done"):
+            as_type(columns[name], list[float])
+        return found
+    except (gzip.BadGzipFile, EOFError, zlib.error, ValueError) as error:
         raise ValueError(f"found a damaged trace {path} ({error}): remove it, then it is done without") from error
 
 

@@ -25,7 +25,7 @@ from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, read
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Run, learning_rate
+from caldrive.perception.optimisation import TrainingRun, learning_rate
 from caldrive.perception.precision import Features, driving_precision, features_in
 from caldrive.perception.specs import loss
 
@@ -56,7 +56,7 @@ def _kept(path: Path, digest: str) -> Tensor | None:
     return tensors["features"] if header.get("digest") == digest else None
 
 
-def feature_table(run: Run, info: CheckpointInfo, out: Path, done: Callable[[int], None]) -> Tensor:
+def feature_table(run: TrainingRun, info: CheckpointInfo, out: Path, done: Callable[[int], None]) -> Tensor:
     """What the backbone, rounded as it is stored, makes of every frame (N, F); kept in `out`, so that it goes on after
     a kill. info: of the network as it is stored; done: told how many frames are seen."""
     network, frames = run.network.cpu().eval(), run.sampler.frames
@@ -82,7 +82,7 @@ def forget_features(out: Path) -> None:
     shutil.rmtree(out / FOLDER, ignore_errors=True)
 
 
-def learn_blocks(run: Run, features: Tensor) -> Iterator[float]:
+def learn_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
     """Trains the blocks of the run's network on features (N, F) of all its frames; yields each step's loss."""
     network, frames = run.network, run.sampler.frames
     config = replace(run.config, steps=run.config.block_steps)  # the rate's warm-up and cosine begin anew

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 import struct
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,11 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from caldrive.config import BlockConfig, PerceptionConfig
+from caldrive.config import PerceptionConfig
 from caldrive.files import write_whole
 from caldrive.perception.network import Network
 from caldrive.perception.specs import describe
+from caldrive.typed import as_type, read_json
 
 FORMAT_VERSION = 1
 KEY = "caldrive"
@@ -43,16 +44,11 @@ class CheckpointInfo:
     ranges: tuple[float, ...] = ()
 
 
-def config_from_dict(values: dict[str, Any]) -> PerceptionConfig:
-    """The inverse of `dataclasses.asdict`."""
-    nested: dict[str, Any] = {k: BlockConfig(**v) if isinstance(v, dict) else v for k, v in values.items()}
-    return PerceptionConfig(**nested)
-
-
 def write_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any]) -> None:
     """Write tensors and a JSON header, whole or not at all."""
     contiguous = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    write_whole(path, save(contiguous, metadata={KEY: json.dumps({"version": FORMAT_VERSION} | header)}))
+    text = json.dumps({"version": FORMAT_VERSION} | header, allow_nan=False)
+    write_whole(path, save(contiguous, metadata={KEY: text}))
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
@@ -64,14 +60,14 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     try:
         tensors = load(content)
         size = struct.unpack("<Q", content[:8])[0]
-        metadata = json.loads(content[8 : 8 + size]).get("__metadata__", {})
+        metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__", {})
+        header = read_json(metadata[KEY], dict[str, Any]) if KEY in metadata else None
     except (SafetensorError, ValueError, struct.error) as error:
         raise CheckpointError(f"{path} is damaged or no safetensors file: copy it again or train anew") from error
-    if KEY not in metadata:
+    if header is None:
         raise CheckpointError(f"{path} holds tensors, but no network of caldrive: give a file made by `caldrive train`")
-    header: dict[str, Any] = json.loads(metadata[KEY])
-    if header["version"] != FORMAT_VERSION:
-        found = header["version"]
+    if header.get("version") != FORMAT_VERSION:
+        found = header.get("version")
         raise CheckpointError(
             f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: train the network anew"
         )
@@ -107,22 +103,20 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         raise CheckpointError(
             f"{path} is a training state, not a finished network: give the model.safetensors beside it"
         )
-    if header["specs"] != json.loads(json.dumps(describe())):
+    if header.get("specs") != json.loads(json.dumps(describe())):
         raise CheckpointError(
             f"{path} was trained for other affordances than this caldrive's six: train the network anew"
         )
     try:
-        config = config_from_dict(header["config"])
-        network = Network(config)
+        info = as_type({f.name: header[f.name] for f in fields(CheckpointInfo) if f.name in header}, CheckpointInfo)
+        network = Network(info.config)
         network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
-        ranges = tuple(map(float, header.get("ranges", ())))
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise CheckpointError(
             f"the weights in {path} do not fit its own configuration: train the network anew"
         ) from error
-    info = CheckpointInfo(config, header["data"], header["metrics"], header["training"], header["seed"], ranges)
     if not all(bool(value.isfinite().all()) for value in network.state_dict().values()):
         raise CheckpointError(f"{path} has weights that are not numbers: train the network anew")
-    if not all(0 < one < math.inf for one in ranges):
+    if not all(0 < one < math.inf for one in info.ranges):
         raise CheckpointError(f"{path} has ranges of integers that are not more than 0: train the network anew")
     return network.eval(), info

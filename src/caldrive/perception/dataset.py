@@ -6,6 +6,7 @@ batch lists each frame once and says where the windows find it, so no frame pass
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -86,6 +87,11 @@ class Frames:
 
     def __len__(self) -> int:
         return len(self._where)
+
+    @property
+    def digest(self) -> str:
+        """Tells these episodes from others."""
+        return hashlib.sha256(repr(self.episodes).encode()).hexdigest()[:16]
 
     @staticmethod
     def _stream_starts(episodes: Sequence[Episode]) -> Ids:

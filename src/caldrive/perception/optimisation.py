@@ -60,7 +60,7 @@ class Lessons(nn.Module):
 
 
 @dataclass
-class Run:
+class TrainingRun:
     """A training run: what changes from step to step, and what is needed to change it."""
 
     config: TrainingConfig
@@ -128,7 +128,10 @@ class Run:
         tensors = {f"lessons.{name}": value for name, value in self.lessons.state_dict().items()}
         for number, state in self.optimizer.state_dict()["state"].items():
             tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
-        header = {"step": self.step, "config": asdict(self.network.config), "training": asdict(self.config)}
+        header = {
+            "step": self.step, "config": asdict(self.network.config), "training": asdict(self.config),
+            "episodes": self.sampler.frames.digest,
+        }  # fmt: skip
         write_tensors(path, tensors, {"kind": "training"} | header)
 
     def restore(self, path: Path) -> None:
@@ -138,6 +141,10 @@ class Run:
         if not same or header.get("config") != asdict(self.network.config):
             raise CheckpointError(
                 f"{path} belongs to a run with other settings: give another folder or remove this one"
+            )
+        if header.get("episodes", self.sampler.frames.digest) != self.sampler.frames.digest:
+            raise CheckpointError(
+                f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
             )
         known = {k.removeprefix("lessons."): v for k, v in tensors.items() if k.startswith("lessons.")}
         if known.keys() != self.lessons.state_dict().keys():

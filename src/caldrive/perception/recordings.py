@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from caldrive.episodes import EpisodeError
 from caldrive.files import write_figure
 from caldrive.perception.evaluation import Done, unwatched
 from caldrive.perception.folders import class_counts, episode_paths
+from caldrive.perception.repaint import FREEDOM
 
 HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
     "vehicle_distance": (np.linspace(0, 50, 26), "m"),
@@ -36,11 +37,15 @@ class Recording:
 
 
 def check_episode(path: Path) -> Episode:
-    """An episode whose every image can be decoded. Raises EpisodeError where it has one that cannot."""
-    episode = read_episode(path)
+    """An episode whose every image can be decoded, all of one size. Raises EpisodeError where one cannot."""
+    episode = read_episode(path, semantic=True)
+    size = episode.image(0).shape[:2]
     for row in range(len(episode)):
-        episode.image(row)
-    return episode
+        if episode.image(row).shape[:2] != size:
+            raise EpisodeError(f"row {row} of {path} has an image of another size than row 0: record again")
+        if episode.semantics is not None and episode.semantic(row, size).max() >= len(FREEDOM):
+            raise EpisodeError(f"row {row} of {path} has a semantic image with unknown classes: record again")
+    return replace(episode, semantics=None)
 
 
 def check_recording(folder: Path, progress: Done = unwatched) -> tuple[Recording, list[Episode]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict
@@ -24,22 +25,27 @@ from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Lessons, Run, learning_rate
+from caldrive.perception.optimisation import Lessons, TrainingRun, learning_rate
 from caldrive.perception.sampler import Sampler, summary
 from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.specs import class_weights
 from caldrive.perception.team import Team, join
+from caldrive.typed import read_json
 
-Row = dict[str, float]
+Row = dict[str, int | float]
 
 RANGED = 128  # frames on which the ranges of 8 bits are found
 MODEL, STATE, METRICS, CURVES = "model.safetensors", "state.safetensors", "metrics.jsonl", "curves.png"
 
 
 def kept_rows(path: Path, step: int) -> list[Row]:
-    """Rows of the metrics that a run taken up at this step will not write again."""
-    lines = path.read_text().splitlines() if path.is_file() else []
-    return [row for row in map(json.loads, lines) if row["step"] <= step]
+    """Rows of the metrics that a run taken up at this step will not write again. Raises CheckpointError where they are
+    damaged."""
+    lines = path.read_bytes().splitlines() if path.is_file() else []
+    try:
+        return [row for row in (read_json(line, Row) for line in lines) if row["step"] <= step]
+    except (ValueError, KeyError) as error:
+        raise CheckpointError(f"{path} is damaged ({error}): remove the folder, or give another --out") from error
 
 
 def _initial(path: str, perception: PerceptionConfig) -> Network:
@@ -57,7 +63,7 @@ def start(
     imagenet: Path | None,
     team: Team,
     initial: str | None = None,
-) -> Run:
+) -> TrainingRun:
     """A run at its first step; initial: the network to begin with."""
     torch.manual_seed(config.seed)
     network = Network(perception) if initial is None else _initial(initial, perception)
@@ -69,10 +75,10 @@ def start(
     lessons = Lessons(network, head).to(team.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
     weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    return Run(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
+    return TrainingRun(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
 
 
-def validate(run: Run, held: Frames, model: Path, context: int) -> Row:
+def validate(run: TrainingRun, held: Frames, model: Path, context: int) -> Row:
     """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`.
 
     context: frames of history that it sees.
@@ -132,7 +138,7 @@ def train(
     return out / MODEL
 
 
-def _finish(run: Run, held: Frames, out: Path, rows: list[Row], board: Board, bar: Progress) -> None:
+def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: Board, bar: Progress) -> None:
     """The blocks learn alone, unless they did already."""
     last = run.config.steps + run.config.block_steps
     if any(row["step"] == last for row in kept_rows(out / METRICS, last)):
@@ -154,10 +160,12 @@ def _finish(run: Run, held: Frames, out: Path, rows: list[Row], board: Board, ba
     forget_features(out)
 
 
-def _step(run: Run, held: Frames, out: Path, rows: list[Row]) -> Row:
+def _step(run: TrainingRun, held: Frames, out: Path, rows: list[Row]) -> Row:
     """One step and what belongs after it; returns its row of the metrics."""
     config, began = run.config, time.perf_counter()
     row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": run.advance()}
+    if not math.isfinite(row["loss"]):
+        raise ValueError(f"found a loss of {row['loss']} at step {run.step}, wanted a number: type a smaller --rate")
     row["windows_per_s"] = config.batch / (time.perf_counter() - began)
     last = run.step == config.steps
     if last or run.step % config.evaluate_every == 0:

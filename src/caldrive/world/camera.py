@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.config import CameraConfig
-from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
+from caldrive.datatypes import Image, LightState, PedestrianState, VehicleState
 from caldrive.world.actors import Actors, car_actors, person_actors
 from caldrive.world.atmosphere import Atmosphere
 from caldrive.world.batches import Crowd, TownBatch, town_batches, vertex_array
@@ -59,15 +59,6 @@ class Camera:
         """
         lenses = [mounted(ego, mount) for mount in mounts]
         return self.render_through(lenses, weather, vehicles, pedestrians, lights, time)
-
-    def render_from(
-        self, weather: int, pose: Pose, height: float, pitch: float = 0.0, fov: float = 90.0,
-        size: tuple[int, int] = (960, 432), vehicles: Sequence[VehicleState] = (),
-        pedestrians: Sequence[PedestrianState] = (), lights: Mapping[str, LightState] | None = None, time: float = 0.0,
-    ) -> Image:  # fmt: skip
-        """A picture from anywhere: height in m, pitch in rad (+ up), fov in degrees, size in pixels."""
-        lens = Lens(pose, height, pitch, fov, size)
-        return self.render_through([lens], weather, vehicles, pedestrians, lights or {}, time)[0]
 
     def render_through(
         self, lenses: Sequence[Lens], weather: int, vehicles: Sequence[VehicleState],
