@@ -149,10 +149,16 @@ def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: 
 )  # fmt: skip
 def test_results_that_cannot_be_are_named(change: dict[str, Any], whole: BenchmarkSettings, tmp_path: Path) -> None:
     line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
-    for spoilt in (line | {"result": line["result"] | change}, line | {"figures": {"off_lane": None}}):
-        (tmp_path / "results.jsonl").write_text(json.dumps(spoilt) + "\n")
-        with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
-            read_lines(tmp_path / "results.jsonl")
+    (tmp_path / "results.jsonl").write_text(json.dumps(line | {"result": line["result"] | change}) + "\n")
+    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
+        read_lines(tmp_path / "results.jsonl")
+
+
+def test_figures_that_are_no_numbers_are_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
+    (tmp_path / "results.jsonl").write_text(json.dumps(line | {"figures": {"off_lane": None}}) + "\n")
+    with pytest.raises(ValueError, match="off_lane is no number"):
+        read_lines(tmp_path / "results.jsonl")
 
 
 def test_an_episode_that_is_there_twice_is_named(whole: BenchmarkSettings, tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def test_a_key_that_could_not_name_a_file_is_refused(key: str, tmp_path: Path) -
         {"cars": 3},
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], tmp_path: Path) -> None:
     rows = json.loads(to_json(suite("quick")[:1]))
     (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"scenario": rows[0]["scenario"] | change}]))

@@ -34,7 +34,7 @@ FOLDER, CHUNK, BATCH = "features", 8192, 64  # frames in a file, and at once
 
 def _digest(backbone: Backbone, precision: str, ranges: tuple[float, ...], frames: Frames) -> str:
     """Of all that the features depend on: the backbone, how it computes, and which frames it sees."""
-    found = hashlib.sha256(repr((precision, ranges, frames.episodes)).encode())
+    found = hashlib.sha256(repr((precision, ranges, frames.digest)).encode())
     for value in backbone.state_dict().values():
         found.update(value.detach().cpu().numpy().tobytes())
     return found.hexdigest()[:16]

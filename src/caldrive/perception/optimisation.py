@@ -142,7 +142,7 @@ class TrainingRun:
             raise CheckpointError(
                 f"{path} belongs to a run with other settings: give another folder or remove this one"
             )
-        if header.get("episodes", self.sampler.frames.digest) != self.sampler.frames.digest:
+        if header.get("episodes") != self.sampler.frames.digest:
             raise CheckpointError(
                 f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
             )
