@@ -7,6 +7,7 @@ from functools import lru_cache
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from caldrive.world import effects, semantic_shaders, shaders
 from caldrive.world.textures import texture_layers
@@ -110,7 +111,7 @@ def rain_drops() -> NDArray[np.uint8]:
 
 class Target:
     """A picture (width, height) to draw into and to read back. fine: it is drawn so many times as wide and as high, and
-    fine * fine pixels give one by their mean, as a lens does; 1 or 2."""
+    fine * fine pixels give one by their mean, as a lens does."""
 
     def __init__(self, size: tuple[int, int], fine: int = 1) -> None:
         gl = gl_context()
@@ -122,7 +123,4 @@ class Target:
         """The picture (H, W, 3); pictures are drawn upside down, so the first row read is the top one."""
         picture = np.empty((self.size[1], self.size[0], 3), np.uint8)
         self.drawn.read_into(picture, components=3, alignment=1)
-        if self.fine == 1:
-            return picture
-        pairs = picture[0::2].astype(np.uint16) + picture[1::2]
-        return ((pairs[:, 0::2] + pairs[:, 1::2] + 2) >> 2).astype(np.uint8)
+        return picture if self.fine == 1 else np.array(Image.fromarray(picture).reduce(self.fine))
