@@ -202,3 +202,8 @@ def test_nobody_is_run_over_on_a_street_where_a_fast_car_drives_up_and_down(town
         ahead = (c * d[:, 0] + s * d[:, 1] - 2.1)[stepped]
         closest = min([closest, *ahead[ahead > 0]])
     assert closest > 12.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_whoever_stands_at_the_end_of_his_way_already_arrives_without_a_warning() -> None:
+    assert may(car(10.0), 12.0, 0.5, 0.0, 0.0)

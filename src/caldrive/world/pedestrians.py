@@ -211,9 +211,9 @@ def may_walk(position: Points, way: Points, pace: Floats, cars: list[VehicleStat
     sideways = way[:, :1] * -v + way[:, 1:] * u  # how far the stretch goes across each car's corridor
     share = np.where(np.abs(sideways) > 1e-6, (np.abs(left) - CORRIDOR) / np.maximum(np.abs(sideways), 1e-6), np.inf)
     entering = (share > 0) & (share <= 1) & (left * sideways < 0)
-    arrives = share * np.hypot(*way.T)[:, None] / pace[:, None]
     moving = speed > 0.3
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore"):  # who stands still and crosses nothing: infinity times 0, which enters nothing
+        arrives = share * np.hypot(*way.T)[:, None] / pace[:, None]
         then = ahead + share * (way[:, :1] * u + way[:, 1:] * v) - speed * arrives
         gained = np.where(moving, MAY_GAIN, 0.0) * arrives  # they reckon with a car that speeds up
         nearest, fastest = then - gained * arrives / 2, speed + gained
