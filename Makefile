@@ -35,8 +35,8 @@ model: $(READY)
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
-# The suites for both agents and their reports in docs/results; a run that was stopped goes on. An episode that one suite
-# shares with another is driven once.
+# The suites for both agents, and in docs/results their reports and every episode's line, from which the tables follow
+# again; a run that was stopped goes on. An episode that one suite shares with another is driven once.
 results: $(READY)
 	@for agent in oracle cal; do \
 		known=(); \
@@ -48,6 +48,10 @@ results: $(READY)
 	done
 	@for suite in corl2017 nocrash traffic-school; do \
 		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out docs/results/$$suite; \
+		for agent in oracle cal; do \
+			mkdir -p docs/results/$$suite/$$agent; \
+			cp $(RESULTS)/$$suite/$$agent/{run.json,results.jsonl} docs/results/$$suite/$$agent; \
+		done; \
 	done
 
 $(READY): pyproject.toml constraints.txt
