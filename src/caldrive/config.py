@@ -121,9 +121,10 @@ class CollectConfig:
     a part counts. cars: in half of the episodes; the others have a third of them. crossing: how much more people cross
     than usual.
 
-    Shares of the episodes: before_signs, before_turns begin before a sign, and before a turn at a junction; displaced
-    begin beside their lane; rearranged have other houses, trees and colours along the same streets; hidden_cars have a
-    driver who is told of no car ahead. semantic: a semantic image of each frame.
+    Shares of the episodes: tailgating ones begin anywhere among twice the cars, and their driver comes close to those
+    ahead; of the others, before_signs and before_turns begin before a sign and before a turn at a junction, and
+    hidden_cars have a driver who is told of no car ahead. displaced begin beside their lane; rearranged have other
+    houses, trees and colours along the same streets. semantic: a semantic image of each frame.
     """
 
     town: str = "town01"
@@ -138,6 +139,7 @@ class CollectConfig:
     displaced: float = 0.3
     rearranged: float = 0.85
     hidden_cars: float = 0.1
+    tailgating: float = 0.3
     width: int = 200
     height: int = 88
     semantic: bool = False

@@ -18,8 +18,9 @@ import numpy as np
 
 from caldrive.config import CameraConfig, CollectConfig, ControlConfig, LongitudinalConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Observation, Scenario
+from caldrive.datatypes import Control, Observation, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.driving.distracted import HiddenCars, Tailgater
 from caldrive.driving.disturbance import Disturbance, LateStart
 from caldrive.driving.limits import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.pool import spread
@@ -38,17 +39,8 @@ MAX_YAW = math.radians(15)
 PATIENCE = 2  # times an episode's duration
 STANDING = 0.1  # m/s
 STOOD, RUN = 15, 9  # moments that are recorded when the car comes to stand; then a run of these in so many times STOOD
+GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
 CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
-
-
-class _HiddenCars(OraclePerception):
-    """Tells the controller that nobody drives ahead: it comes so close that hazard stops behind cars are seen.
-
-    The paper sets the distance to zero for this end; its own following law would then stop the car at once.
-    """
-
-    def predict(self, observation: Observation) -> Affordances:
-        return replace(super().predict(observation), vehicle_distance=MAX_VEHICLE_DISTANCE)
 
 
 def episode_path(folder: Path, number: int) -> Path:
@@ -105,18 +97,19 @@ def _set_up(
     """A random start and random turns; returns the scenario and the driver."""
     arrangement = int(rng.integers(1, 2**31))
     roads = world.enter(config.town, arrangement if rng.random() < config.rearranged else 0)
-    start, turn = starting_place(roads, config.before_signs, config.before_turns, rng)
+    close = rng.random() < config.tailgating
+    rare = (0.0, 0.0) if close else (config.before_signs, config.before_turns)
+    start, turn = starting_place(roads, *rare, rng)
     route = random_route(roads, start, config.duration * 14 + 50, rng, turn)
     under = config.weathers[number % len(config.weathers)]
-    cars = config.cars if rng.random() < 0.5 else config.cars // 3
+    cars = 2 * config.cars if close else config.cars if rng.random() < 0.5 else config.cars // 3
     seed = int(rng.integers(2**31))
     scenario = Scenario(
         config.town, under, start, route.line.pose_at(route.length), cars, config.people, config.duration,
         seed, "collect", config.crossing,
     )  # fmt: skip
     cap = CAPS[int(rng.integers(len(CAPS)))]
-    hidden = rng.random() < config.hidden_cars
-    oracle = (_HiddenCars if hidden else OraclePerception)(world.truth)
+    oracle = _oracle(world, config, close, rng)
     # Whom no car is told of must not take one for nothing, however long it stands there.
     laws = replace(LongitudinalConfig(), hazard_patience=math.inf, red_patience=math.inf)
     agent = CALAgent(oracle, Controller(ControlConfig(laws, cap=cap)))
@@ -125,6 +118,13 @@ def _set_up(
         world.displace(float(rng.uniform(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
     agent.reset()
     return scenario, agent
+
+
+def _oracle(world: EmbeddedWorld, config: CollectConfig, close: bool, rng: np.random.Generator) -> OraclePerception:
+    """Who tells the controller of the town: the truth, or a part of it."""
+    if close:
+        return Tailgater(world.truth, float(rng.uniform(*GAPS)))
+    return (HiddenCars if rng.random() < config.hidden_cars else OraclePerception)(world.truth)
 
 
 def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[tuple[int, Observation, bool]]:

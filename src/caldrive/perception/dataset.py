@@ -25,7 +25,7 @@ Ids = NDArray[np.int64]
 COMMAND_NUMBERS = {command.value: number for number, command in enumerate(Command)}
 # Edges of the classes in which the size of a continuous column is balanced.
 SIZES = {
-    "vehicle_distance": (10.0, 25.0, MAX_VEHICLE_DISTANCE),
+    "vehicle_distance": (3.0, 6.0, 12.0, 25.0, MAX_VEHICLE_DISTANCE),
     "center_distance": (0.4, 0.8, 1.2),
     "clean_steer": (0.05, 0.15, 0.4),
 }

@@ -1,0 +1,66 @@
+"""Recorders' drivers who are told something else than the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from caldrive.config import ControlConfig, LongitudinalConfig
+from caldrive.control.controller import Controller
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Pose, Scenario
+from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.driving.distracted import HiddenCars, Tailgater
+from tests.fakes import StraightRoad
+
+PATIENT = ControlConfig(LongitudinalConfig(hazard_patience=math.inf, red_patience=math.inf), cap=20.0)
+AWAY = Scenario("fake", 1, Pose(0.0, 0.0, 0.0), Pose(1000.0, 0.0, 0.0))
+
+
+def road(**there: object) -> StraightRoad:
+    world = StraightRoad(**there)  # type: ignore[arg-type]
+    world.reset(AWAY)
+    return world
+
+
+def nearest(world: StraightRoad, perception: OraclePerception, seconds: float = 40.0) -> float:
+    """How near the driver comes to the car ahead, in m."""
+    agent, gaps = CALAgent(perception, Controller(PATIENT)), []
+    observation = world.reset(AWAY)
+    for _ in range(round(seconds / world.dt)):
+        observation = world.step(agent.act(observation))
+        gaps.append(world.truth().affordances.vehicle_distance)
+    assert observation.speed < 0.3
+    return min(gaps)
+
+
+@pytest.mark.parametrize("gap", [0.5, 1.5, 3.0, 4.0])
+def test_a_tailgater_stops_at_his_gap_and_hits_nobody(gap: float) -> None:
+    world = road(lead=lambda time: 80.0)
+    assert 0.3 * gap < nearest(world, Tailgater(world.truth, gap)) < gap + 0.8
+
+
+def test_others_stop_farther_away() -> None:
+    world = road(lead=lambda time: 80.0)
+    assert nearest(world, OraclePerception(world.truth)) > 4.5
+    assert 2.0 < nearest(world, HiddenCars(world.truth)) < 5.0
+
+
+def test_a_tailgater_stops_for_people() -> None:
+    world = road(person=lambda time: (50.0, 0.0))
+    agent = CALAgent(Tailgater(world.truth, 1.0), Controller(PATIENT))
+    observation = world.reset(AWAY)
+    for _ in range(150):
+        observation = world.step(agent.act(observation))
+    assert observation.speed < 0.3
+    assert world.along < 49.0
+
+
+@pytest.mark.parametrize("kind", [HiddenCars, lambda truth: Tailgater(truth, 1.0)])
+def test_on_an_empty_road_all_are_told_the_truth(kind: Callable[..., OraclePerception]) -> None:
+    world = road(light=5.0)
+    observation = world.reset(AWAY)
+    told = kind(world.truth).predict(observation)
+    assert told == world.truth().affordances
+    assert told.vehicle_distance == MAX_VEHICLE_DISTANCE
