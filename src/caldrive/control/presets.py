@@ -20,9 +20,9 @@ Where DEFAULT differs, and why:
     red light from          0.9                  0.5                 and a missed person is worse than a needless brake
     before a hazard that    stands for ever      goes on at 4 km/h   nobody takes so long to cross a road (the longest
     is no car                                    after 15 s          of 226 stops took 11 s), so it is none
-    before a red light      stands for ever      twice rolls on for  98 of 100 reds are over by then (1,566 stops of the
-                                                 1.2 s, each time    oracle in town01), and what looks red from here may
-                                                 after 12 s          not half a metre further on
+    before a red light      stands for ever      twice rolls on for  99 of 100 reds are over by then in town01's dense
+                                                 1.2 s, each time    traffic (386 stops), and what looks red from here
+                                                 after 25 s          may not half a metre further on
     PID gains               the authors'         by step responses   less than 1 km/h too fast from 20 to 90 km/h
 """
 

@@ -166,7 +166,7 @@ def _check(config: CollectConfig, workers: int) -> None:
     for name, (low, high) in limits.items():
         require_within(f"--{name}", asked[name], low, high, usual[name])
     if not config.weathers:
-        raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 3 1 6 8")
+        raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 8 3 1 8 6")
     for number in config.weathers:
         weather(number)
     load_town(config.town)
