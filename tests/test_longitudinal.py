@@ -167,13 +167,13 @@ def test_before_a_light_that_stays_red_the_car_rolls_on_twice_and_waits_anew() -
     results = wait(90.0, DEFAULT_LAWS, red_light=0.95)
     stands = [r.state is DriveState.RED_LIGHT and r.brake >= 0.8 for r in results]
     rolls = [r.state is DriveState.CRUISING and r.target_speed == 4.0 for r in results]
-    assert all(stands[:119] + rolls[120:131] + stands[133:251] + rolls[254:263] + stands[266:])
+    assert all(stands[:249] + rolls[250:261] + stands[263:511] + rolls[514:523] + stands[526:])
     assert all(a != b for a, b in zip(stands, rolls, strict=True))
     assert sum(rolls) == 2 * 12
 
 
 def test_a_light_that_looks_green_from_further_on_is_passed() -> None:
-    rolling = wait(12.5, DEFAULT_LAWS, red_light=0.95)[-1]
+    rolling = wait(25.5, DEFAULT_LAWS, red_light=0.95)[-1]
     green = longitudinal_step(Affordances(), 3.0, STRAIGHT, 30.0, rolling.memory, 0.1, DEFAULT_LAWS)
     assert (rolling.target_speed, green.target_speed) == (4.0, 30.0)
     assert (green.memory.waited_red, green.memory.rolls) == (0.0, 0)
@@ -181,11 +181,11 @@ def test_a_light_that_looks_green_from_further_on_is_passed() -> None:
 
 def test_a_red_light_that_flickers_is_waited_for_no_longer() -> None:
     memory = Memory()
-    for k in range(122):
+    for k in range(254):
         seen = Affordances(red_light=0.3 if k % 50 == 49 else 0.9)
         step = longitudinal_step(seen, 0.0, STRAIGHT, 30.0, memory, 0.1, DEFAULT_LAWS)
         memory = step.memory
-    assert (step.state, step.target_speed) == (DriveState.RED_LIGHT, 0.0)  # for 0.2 of these 12.2 s it was not seen
+    assert (step.state, step.target_speed) == (DriveState.RED_LIGHT, 0.0)  # for 0.5 of these 25.4 s it was not seen
     for _ in range(5):
         step = longitudinal_step(seen, 0.0, STRAIGHT, 30.0, memory, 0.1, DEFAULT_LAWS)
         memory = step.memory
