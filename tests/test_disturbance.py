@@ -89,3 +89,21 @@ def test_a_late_start_is_late_in_half_of_the_cases_and_2_s_at_most() -> None:
 def test_a_car_on_its_way_is_never_held() -> None:
     start = LateStart(np.random.default_rng(0))
     assert {start.apply(Control(throttle=0.2), 0.4) for _ in range(500)} == {Control(throttle=0.2)}
+
+
+def test_who_has_braked_hard_brakes_on_in_half_of_the_cases() -> None:
+    start, found = LateStart(np.random.default_rng(3)), []
+    for _ in range(200):
+        start.apply(Control(brake=0.9), 4.0)
+        braking = [start.apply(Control(throttle=0.3), 2.0).brake for _ in range(25)]
+        assert braking == sorted(braking, reverse=True)
+        found.append(round(sum(braking)))
+    assert 80 < sum(steps > 0 for steps in found) < 120
+    assert {min(s for s in found if s), max(found)} <= set(range(5, 21))
+
+
+def test_who_has_braked_gently_goes_on() -> None:
+    start = LateStart(np.random.default_rng(3))
+    for _ in range(200):
+        assert start.apply(Control(brake=0.3), 4.0) == Control(brake=0.3)
+        assert start.apply(Control(throttle=0.3), 4.0) == Control(throttle=0.3)

@@ -7,6 +7,8 @@ import numpy as np
 
 from caldrive.datatypes import Control
 
+HARD = 0.8  # brake of a hazard stop or before a red light
+
 
 class Disturbance:
     """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
@@ -37,20 +39,29 @@ class Disturbance:
 
 
 class LateStart:
-    """A driver who dreams on for up to 2 s, in half of the cases, where a standing car may go. One that starts at once
-    stands before red lights only, and a network with a memory learns that whatever it stands before is red."""
+    """A driver who dreams on for up to 2 s, in half of the cases, where a car that stands or brakes hard may go.
+
+    One that starts at once stands before red lights only, and a network with a memory learns that whatever it stands
+    before is red; one that lets go of the brake at once is never seen standing between area A1 and the stop line.
+    """
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self.rng, self.left, self.asked = rng, 0, False
+        self.rng, self.left, self.asked, self.braked = rng, 0, False, False
 
     def apply(self, control: Control, speed: float) -> Control:
-        """The control, or standing on."""
+        """The control, or braking on."""
         if speed > 1.0:
             self.asked = False
         elif speed < 0.1 and control.throttle > 0 and not self.asked:
             self.asked = True
-            self.left = int(self.rng.integers(5, 21)) if self.rng.random() < 0.5 else 0
+            self._dream()
+        if self.braked and control.brake == 0 and speed > 0.5 and self.left == 0:
+            self._dream()
+        self.braked = control.brake >= HARD
         if self.left == 0:
             return control
         self.left -= 1
         return Control(brake=1.0, steer=control.steer)
+
+    def _dream(self) -> None:
+        self.left = int(self.rng.integers(5, 21)) if self.rng.random() < 0.5 else 0
