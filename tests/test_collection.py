@@ -24,7 +24,9 @@ from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.semantics import Semantic
 from caldrive.world.traffic import stop_sumo
 
-TINY = CollectConfig("town02", (1, 6), episodes=3, duration=2.0, cars=6, people=10, width=48, height=24, seed=4)
+TINY = CollectConfig(
+    "town02", (1, 6), episodes=3, duration=2.0, cars=6, people=10, tailgating=0.0, width=48, height=24, seed=4
+)
 
 
 @pytest.fixture(autouse=True)
@@ -113,7 +115,7 @@ def standing_world() -> SimpleNamespace:
 def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
     world = standing_world()
     told = []
-    for index, _, telling in collection._moments(world, replace(TINY, duration=20.0)):  # type: ignore[arg-type]
+    for index, _, telling in collection._moments(world, replace(TINY, duration=20.0), False):  # type: ignore[arg-type]
         world.observation.speed = 5.0 if index >= 200 else 0.0
         told += [index] if telling else []
     standing = [index for index in told if index <= 200]
@@ -123,15 +125,25 @@ def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
 
 def test_a_light_that_changes_before_a_standing_car_tells_something() -> None:
     world, told = standing_world(), []
-    for index, _, telling in collection._moments(world, replace(TINY, duration=10.0)):  # type: ignore[arg-type]
+    for index, _, telling in collection._moments(world, replace(TINY, duration=10.0), False):  # type: ignore[arg-type]
         world.truth().affordances = Affordances(red_light=float(index < 60))
         told += [index] if telling else []
     assert told == [*range(17), *range(61, 77), *range(196, 200)]
 
 
+def test_who_looks_for_cars_tells_of_the_beginning_and_of_those_met() -> None:
+    world, told = standing_world(), []
+    world.observation.speed = 5.0
+    for index, _, telling in collection._moments(world, replace(TINY, duration=5.0), True):  # type: ignore[arg-type]
+        world.truth().affordances = Affordances(vehicle_distance=20.0 if 100 <= index < 110 else 40.0)
+        told += [index] if telling else []
+    assert told == [*range(20), *range(101, 111)]
+    assert index == 299  # six times as long as an episode that tells all the time
+
+
 def test_an_episode_in_which_the_car_stands_on_ends() -> None:
     world = standing_world()
-    assert len(list(collection._moments(world, replace(TINY, duration=5.0)))) == 100  # type: ignore[arg-type]
+    assert len(list(collection._moments(world, replace(TINY, duration=5.0), False))) == 100  # type: ignore[arg-type]
 
 
 def test_weathers_take_turns(unbroken: Path) -> None:

@@ -139,7 +139,7 @@ class CollectConfig:
     displaced: float = 0.3
     rearranged: float = 0.85
     hidden_cars: float = 0.1
-    tailgating: float = 0.3
+    tailgating: float = 0.2
     width: int = 200
     height: int = 88
     semantic: bool = False

@@ -36,7 +36,8 @@ BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
 ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
-PATIENCE = 2  # times an episode's duration
+PATIENCE, SEARCH = 2, 6  # times an episode's duration; of those who look for cars
+BEGINNING, MEETING = 20, 25.0  # their first moments tell, then those in which the car ahead is nearer (m)
 STANDING = 0.1  # m/s
 STOOD, RUN = 15, 9  # moments that are recorded when the car comes to stand; then a run of these in so many times STOOD
 GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
@@ -50,7 +51,8 @@ def episode_path(folder: Path, number: int) -> Path:
 def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, folder: Path) -> int:
     """Drives and records one episode; returns its number of frames (moments times cameras)."""
     rng = np.random.default_rng([config.seed, number])
-    scenario, agent = _set_up(world, config, number, rng)
+    close = rng.random() < config.tailgating
+    scenario, agent = _set_up(world, config, number, close, rng)
     yaws = rng.uniform(-MAX_YAW, MAX_YAW, size=len(BASELINES))
     mounts = [
         CameraConfig(config.width, config.height, left=left, yaw=float(yaw))
@@ -58,7 +60,7 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
     ]
     disturbance, start, frames = Disturbance(rng), LateStart(rng), 0
     with EpisodeWriter(episode_path(folder, number), scenario) as writer:
-        for index, observation, telling in _moments(world, config):
+        for index, observation, telling in _moments(world, config, close):
             clean = agent.act(observation)
             driven = start.apply(disturbance.apply(clean, observation.speed), observation.speed)
             if telling:
@@ -92,15 +94,16 @@ def _frames(
 
 
 def _set_up(
-    world: EmbeddedWorld, config: CollectConfig, number: int, rng: np.random.Generator
+    world: EmbeddedWorld, config: CollectConfig, number: int, close: bool, rng: np.random.Generator
 ) -> tuple[Scenario, CALAgent]:
-    """A random start and random turns; returns the scenario and the driver."""
+    """A random start and random turns; returns the scenario and the driver, who looks for cars to come close to or
+    not."""
     arrangement = int(rng.integers(1, 2**31))
     roads = world.enter(config.town, arrangement if rng.random() < config.rearranged else 0)
-    close = rng.random() < config.tailgating
     rare = (0.0, 0.0) if close else (config.before_signs, config.before_turns)
     start, turn = starting_place(roads, *rare, rng)
-    route = random_route(roads, start, config.duration * 14 + 50, rng, turn)
+    way = config.duration * (SEARCH * 8 if close else 14) + 50
+    route = random_route(roads, start, way, rng, turn)
     under = config.weathers[number % len(config.weathers)]
     cars = 2 * config.cars if close else config.cars if rng.random() < 0.5 else config.cars // 3
     seed = int(rng.integers(2**31))
@@ -127,16 +130,18 @@ def _oracle(world: EmbeddedWorld, config: CollectConfig, close: bool, rng: np.ra
     return (HiddenCars if rng.random() < config.hidden_cars else OraclePerception)(world.truth)
 
 
-def _moments(world: EmbeddedWorld, config: CollectConfig) -> Iterator[tuple[int, Observation, bool]]:
+def _moments(world: EmbeddedWorld, config: CollectConfig, close: bool) -> Iterator[tuple[int, Observation, bool]]:
     """Moments by number, and whether each tells something new, until enough of them did, patience or the route ends, or
-    the car touches something. A car that stands tells the same until what it should stop for changes."""
+    the car touches something. A car that stands tells the same until what it should stop for changes; close: one that
+    looks for others tells where it has found some."""
     wanted, told, stood, before = round(config.duration / world.dt), 0, 0, (0.0, 0.0)
-    for index in range(PATIENCE * wanted):
+    for index in range((SEARCH if close else PATIENCE) * wanted):
         labels = world.truth().affordances
         reasons = labels.hazard_stop, labels.red_light
         stood = stood + 1 if world.observation.speed < STANDING and reasons == before else 0
         before = reasons
         telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
+        telling = telling and (not close or index < BEGINNING or labels.vehicle_distance < MEETING)
         told += telling
         yield index, world.observation, telling
         truth = world.truth()
