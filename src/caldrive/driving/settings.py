@@ -199,7 +199,7 @@ class DataSettings:
 
 @dataclass(frozen=True)
 class EvaluateSettings:
-    """How well a network sees recorded frames: by command, weather and town, beside the paper's figures."""
+    """How well a network sees recorded frames: by command, weather, place and cars, beside the paper's figures."""
 
     data: Path = Path("out/recording")
     """Folder with the recorded episodes."""

@@ -54,7 +54,7 @@ def _scaled(metric: str, figures: Mapping[str, float]) -> str:
 
 
 def evaluation_table(found: Report, precision: str) -> Group:
-    """Mean IoU and MAE over all frames, as the paper has them, and by command, weather and town; confusions."""
+    """Mean IoU and MAE over all frames, as the paper has them, and by command, weather and so on; confusions."""
     paper = {name: _papers(name) for name, _ in FIGURES.values()}
     table = Table("", *FIGURES, box=SIMPLE_HEAD)
     rows = {

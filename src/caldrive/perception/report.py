@@ -1,4 +1,4 @@
-"""How well a network sees: figures by command, weather and town beside the paper's, confusion, and the worst frames."""
+"""How well a network sees: figures by command, weather and place beside the paper, confusion, and the worst frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from caldrive.files import write_figure
-from caldrive.perception.dataset import Frames, Ids
+from caldrive.perception.dataset import SIZES, Frames, Ids
 from caldrive.perception.evaluation import Done, outputs_on, unwatched
 from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import Features
@@ -32,7 +32,8 @@ APART = 30  # frames that lie at least between two of them
 
 @dataclass(frozen=True)
 class Report:
-    """frames: how many. overall: metrics by name. groups: by command, weather and town, the same for each value.
+    """frames: how many. overall: metrics by name. groups: by command, weather, town, place and distance of the car
+    ahead, the same for each value.
     confusion: for each discrete affordance how many frames of each true class (rows) were seen as each (columns)."""
 
     frames: int
@@ -46,6 +47,15 @@ def _part(of: Outputs | Targets, rows: NDArray[np.bool_]) -> dict[str, torch.Ten
     return {name: value[chosen] for name, value in of.items()}
 
 
+def _nearness(targets: Targets) -> NDArray[np.str_]:
+    """How far the car ahead really is (N,), in words that sort."""
+    edges, spec = SIZES["vehicle_distance"], next(spec for spec in SPECS if spec.name == "vehicle_distance")
+    bounds = zip((0.0, *edges), edges, strict=False)
+    names = [f"{low:02.0f} to {high:02.0f} m" for low, high in bounds] + ["none"]
+    found: NDArray[np.str_] = np.array(names)[np.digitize((targets[spec.name] * spec.scale).numpy(), edges)]
+    return found
+
+
 def report(
     network: Network, frames: Frames, features: Features, picture: Path | None = None, progress: Done = unwatched
 ) -> Report:
@@ -55,6 +65,8 @@ def report(
         "command": np.array([command.value for command in COMMANDS])[frames.command[ids]],
         "weather": frames.weather[ids].astype(str),
         "town": frames.town[ids],
+        "place": np.where(frames.junction[ids], "in a junction", "on a street"),
+        "car ahead": _nearness(targets),
     }
     groups = {
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}

@@ -1,0 +1,39 @@
+"""How well a network sees, by what it looks at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from caldrive.episodes import EpisodeWriter
+from caldrive.perception.dataset import Frames
+from caldrive.perception.folders import find_episodes
+from caldrive.perception.network import Network
+from caldrive.perception.report import report
+from tests.perception_data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame
+
+AHEAD = (1.0, 4.0, 4.0, 8.0, 20.0, 30.0, 50.0, 50.0)
+
+
+@pytest.fixture
+def frames(tmp_path: Path) -> Frames:
+    with EpisodeWriter(tmp_path / "one.parquet", SCENARIO) as writer:
+        for index, distance in enumerate(AHEAD):
+            frame = make_frame(index)
+            writer.append(replace(frame, affordances=replace(frame.affordances, vehicle_distance=distance)))
+    return Frames(find_episodes(tmp_path), (HEIGHT, WIDTH))
+
+
+def test_errors_are_told_apart_by_the_distance_of_the_car_ahead_and_by_place(frames: Frames) -> None:
+    network = Network(TINY).eval()
+    found = report(network, frames, network.features)
+    assert found.frames == len(AHEAD)
+    cars = found.groups["car ahead"]
+    assert list(cars) == ["00 to 03 m", "03 to 06 m", "06 to 12 m", "12 to 25 m", "25 to 50 m", "none"]
+    weights = dict(zip(cars, (1, 2, 1, 1, 1, 2), strict=True))
+    mean = sum(n * cars[name]["vehicle_distance/mae"] for name, n in weights.items()) / len(AHEAD)
+    assert mean == pytest.approx(found.overall["vehicle_distance/mae"], rel=1e-4)
+    assert set(found.groups["place"]) == {"in a junction", "on a street"}
+    assert set(found.groups["command"]) == {"left", "straight"}
