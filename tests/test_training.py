@@ -66,10 +66,22 @@ def test_a_run_may_begin_with_a_trained_network(folder: Path, tmp_path: Path) ->
         train(still, folder, tmp_path / "again", TINY, progress=False)
 
 
+def test_blocks_that_are_built_otherwise_begin_anew(folder: Path, tmp_path: Path) -> None:
+    first = train(SHORT, folder, tmp_path / "first", TINY, progress=False)
+    still = replace(SHORT, steps=1, learning_rate=0.0, initial=str(first))
+    longer = replace(TINY, hazard_stop=replace(TINY.hazard_stop, dilation=2))
+    second = load_network(train(still, folder, tmp_path / "second", longer, progress=False))[0]
+    before, after = (dict(network.named_parameters()) for network in (load_network(first)[0], second))
+    same = {name for name in before if torch.equal(before[name], after[name])}
+    assert {"backbone.stages.0.0.weight", "blocks.relative_angle.groups.0.layer.weight"} <= same
+    assert "blocks.hazard_stop.groups.0.layer.weight" not in same
+    assert second.blocks["hazard_stop"].config == longer.hazard_stop
+
+
 def test_a_run_does_not_begin_with_a_network_of_another_kind(folder: Path, tmp_path: Path) -> None:
     first = train(replace(SHORT, steps=1), folder, tmp_path / "first", TINY, progress=False)
     still = replace(SHORT, steps=1, initial=str(first))
-    with pytest.raises(CheckpointError, match="other blocks or another size"):
+    with pytest.raises(CheckpointError, match="another width or image size"):
         train(still, folder, tmp_path / "third", replace(TINY, width=0.5), progress=False)
 
 

@@ -180,7 +180,7 @@ class TrainSettings:
     imagenet: Path | None = None
     """VGG16's weights for preset paper (.safetensors or .pth); without it those in torch.hub's cache."""
     initial: Path | None = None
-    """A trained network (.safetensors) of the same preset to begin with, instead of a new one."""
+    """A trained network (.safetensors) to begin with, instead of a new one; its blocks where they are built alike."""
     rate: float | None = None
     """Base learning rate, where the preset's is not wanted."""
     device: str = "auto"

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, TrainingRun, learning_rate
 from caldrive.perception.sampler import Sampler, summary
 from caldrive.perception.segmentation import STAGE, Segmentation
-from caldrive.perception.specs import class_weights
+from caldrive.perception.specs import SPECS, class_weights
 from caldrive.perception.team import Team, join
 from caldrive.typed import read_json
 
@@ -49,10 +49,19 @@ def kept_rows(path: Path, step: int) -> list[Row]:
 
 
 def _initial(path: str, perception: PerceptionConfig) -> Network:
-    """A trained network to begin with. Raises CheckpointError where it is not built as wanted."""
-    network, info = load_network(path)
-    if info.config != perception:
-        raise CheckpointError(f"{path} is a network with other blocks or another size than wanted: give its --preset")
+    """A network that begins with a trained one's backbone, and with those of its blocks that are built as wanted.
+
+    Raises CheckpointError where the backbone is not.
+    """
+    found, info = load_network(path)
+    wanted = {spec.name: getattr(perception, spec.name) for spec in SPECS}
+    if replace(info.config, **wanted) != perception:
+        raise CheckpointError(f"{path} is a network of another width or image size than wanted: give its --preset")
+    network = Network(perception)
+    network.backbone.load_state_dict(found.backbone.state_dict())
+    for name, config in wanted.items():
+        if getattr(info.config, name) == config:
+            network.blocks[name].load_state_dict(found.blocks[name].state_dict())
     return network
 
 
