@@ -179,7 +179,7 @@ class PerceptionConfig:
     hazard_stop: BlockConfig = BlockConfig("tconv", 64, 0.25, length=5, dilation=2)
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
-    vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
+    vehicle_distance: BlockConfig = BlockConfig("tconv", 64, 0.1, length=5, dilation=2)
     relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
     center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
 
@@ -216,7 +216,7 @@ class TrainingConfig:
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
     """
 
-    steps: int = 6_000
+    steps: int = 9_000
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3
