@@ -8,16 +8,16 @@ import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from caldrive.config import CollectConfig
-from caldrive.datatypes import Affordances, Control
+from caldrive.datatypes import Control
 from caldrive.driving import collection
 from caldrive.driving.collection import BASELINES, _record, collect, episode_path
+from caldrive.driving.distracted import Tailgater
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
 from caldrive.world.embedded import EmbeddedWorld
@@ -105,45 +105,6 @@ def test_frames_inside_a_junction_are_marked(tmp_path: Path) -> None:
 
 def test_the_cameras_see_different_pictures_that_change(episode: Episode) -> None:
     assert len(set(episode.jpegs)) > 50
-
-
-def standing_world() -> SimpleNamespace:
-    truth = SimpleNamespace(contacts=(), route_done=0.0, route_length=100.0, affordances=Affordances())
-    return SimpleNamespace(dt=0.1, observation=SimpleNamespace(speed=0.0), truth=lambda: truth)
-
-
-def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
-    world = standing_world()
-    told = []
-    for index, _, telling in collection._moments(world, replace(TINY, duration=20.0), False):  # type: ignore[arg-type]
-        world.observation.speed = 5.0 if index >= 200 else 0.0
-        told += [index] if telling else []
-    standing = [index for index in told if index <= 200]
-    assert standing == [*range(15), *range(134, 143)]
-    assert told[len(standing) :] == list(range(201, 401 - len(standing)))  # twenty seconds that tell something
-
-
-def test_a_light_that_changes_before_a_standing_car_tells_something() -> None:
-    world, told = standing_world(), []
-    for index, _, telling in collection._moments(world, replace(TINY, duration=10.0), False):  # type: ignore[arg-type]
-        world.truth().affordances = Affordances(red_light=float(index < 60))
-        told += [index] if telling else []
-    assert told == [*range(17), *range(61, 77), *range(196, 200)]
-
-
-def test_who_looks_for_cars_tells_of_the_beginning_and_of_those_met() -> None:
-    world, told = standing_world(), []
-    world.observation.speed = 5.0
-    for index, _, telling in collection._moments(world, replace(TINY, duration=5.0), True):  # type: ignore[arg-type]
-        world.truth().affordances = Affordances(vehicle_distance=20.0 if 100 <= index < 110 else 40.0)
-        told += [index] if telling else []
-    assert told == [*range(20), *range(101, 111)]
-    assert index == 299  # six times as long as an episode that tells all the time
-
-
-def test_an_episode_in_which_the_car_stands_on_ends() -> None:
-    world = standing_world()
-    assert len(list(collection._moments(world, replace(TINY, duration=5.0), False))) == 100  # type: ignore[arg-type]
 
 
 def test_weathers_take_turns(unbroken: Path) -> None:
@@ -258,6 +219,16 @@ def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
     monkeypatch.setattr(collection, "_record", _dies_once)
     list(collect(TINY, tmp_path, workers=2))
     assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_tailgater_drives_among_twice_the_cars_and_is_told_something_else(tmp_path: Path) -> None:
+    config, world = replace(TINY, before_signs=1.0), EmbeddedWorld()
+    scenario, agent = collection._set_up(world, config, 0, True, np.random.default_rng(1))
+    assert scenario.n_vehicles == 2 * config.cars
+    assert isinstance(agent.perception, Tailgater)
+    assert agent.controller.config.cap == 20.0
+    assert collection._set_up(world, config, 0, False, np.random.default_rng(1))[0].n_vehicles <= config.cars
+    world.close()
 
 
 def test_some_episodes_begin_beside_their_lane_and_come_back(tmp_path: Path) -> None:

@@ -47,14 +47,27 @@ def test_others_stop_farther_away() -> None:
     assert 2.0 < nearest(world, HiddenCars(world.truth)) < 5.0
 
 
-def test_a_tailgater_stops_for_people() -> None:
-    world = road(person=lambda time: (50.0, 0.0))
+def stopping_place(world: StraightRoad, seconds: float) -> float:
+    """Where the front axle of a tailgater stands in the end, as an arc length in m."""
     agent = CALAgent(Tailgater(world.truth, 1.0), Controller(PATIENT))
     observation = world.reset(AWAY)
-    for _ in range(150):
+    for _ in range(round(seconds / world.dt)):
         observation = world.step(agent.act(observation))
     assert observation.speed < 0.3
-    assert world.along < 49.0
+    return world.along
+
+
+def test_a_tailgater_stops_for_people() -> None:
+    assert stopping_place(road(person=lambda time: (50.0, 0.0)), 15.0) < 49.0
+
+
+def test_a_tailgater_waits_for_people_who_walk_between_him_and_a_car_that_drives_off() -> None:
+    def lead(time: float) -> float:
+        return 51.5 + 3.0 * max(0.0, time - 22.0)
+
+    there = stopping_place(road(lead=lead), 20.0)
+    crossed = road(lead=lead, person=lambda time: (there + 1.4, 0.0) if time > 20.0 else None)
+    assert stopping_place(crossed, 26.0) < there + 0.3
 
 
 @pytest.mark.parametrize("kind", [HiddenCars, lambda truth: Tailgater(truth, 1.0)])

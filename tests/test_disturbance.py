@@ -102,6 +102,19 @@ def test_who_has_braked_hard_brakes_on_in_half_of_the_cases() -> None:
     assert {min(s for s in found if s), max(found)} <= set(range(5, 21))
 
 
+def test_who_brakes_on_until_the_car_stands_dreams_once() -> None:
+    start, on_the_move = LateStart(np.random.default_rng(4)), []
+    for _ in range(200):
+        start.apply(Control(brake=0.9), 4.0)
+        braking = [start.apply(Control(throttle=0.3), speed).brake > 0 for speed in (1.6, 0.8, *[0.0] * 48)]
+        runs = [len(list(run)) for brakes, run in groupby(braking) if brakes]
+        assert len(runs) <= 1
+        assert set(runs) <= set(range(5, 21))
+        on_the_move += runs if braking[0] else []
+        start.apply(Control(throttle=0.3), 3.0)
+    assert 80 < len(on_the_move) < 120
+
+
 def test_who_has_braked_gently_goes_on() -> None:
     start = LateStart(np.random.default_rng(3))
     for _ in range(200):

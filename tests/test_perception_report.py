@@ -5,15 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from caldrive.episodes import EpisodeWriter
 from caldrive.perception.dataset import Frames
+from caldrive.perception.evaluation import outputs_on
 from caldrive.perception.folders import find_episodes
 from caldrive.perception.network import Network
-from caldrive.perception.report import report
+from caldrive.perception.report import errors, report
+from caldrive.perception.specs import SPECS
 from tests.perception_data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame
 
+DISTANCE = next(spec for spec in SPECS if spec.name == "vehicle_distance")
 AHEAD = (1.0, 4.0, 4.0, 8.0, 20.0, 30.0, 50.0, 50.0)
 
 
@@ -35,5 +39,12 @@ def test_errors_are_told_apart_by_the_distance_of_the_car_ahead_and_by_place(fra
     weights = dict(zip(cars, (1, 2, 1, 1, 1, 2), strict=True))
     mean = sum(n * cars[name]["vehicle_distance/mae"] for name, n in weights.items()) / len(AHEAD)
     assert mean == pytest.approx(found.overall["vehicle_distance/mae"], rel=1e-4)
-    assert set(found.groups["place"]) == {"in a junction", "on a street"}
+    wrong = errors(DISTANCE, *outputs_on(network, frames, network.features)[1:])
+    assert cars["00 to 03 m"]["vehicle_distance/mae"] == pytest.approx(wrong[0], rel=1e-4)
+    assert cars["25 to 50 m"]["vehicle_distance/mae"] == pytest.approx(wrong[5], rel=1e-4)
+    places = {name: row["vehicle_distance/mae"] for name, row in found.groups["place"].items()}
+    inside = np.array(frames.junction)
+    assert 0 < inside.sum() < len(inside)
+    wanted = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
+    assert places == pytest.approx(wanted, rel=1e-4)
     assert set(found.groups["command"]) == {"left", "straight"}

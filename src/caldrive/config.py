@@ -119,12 +119,13 @@ class CollectConfig:
     """What to record. weathers: by turns; the clear noon, when shadows are hardest, and the clear sunset, in which most
     is lost at junctions, come twice as often. duration: s of an episode, which is short, as every place and look tells
     most at first; of the time in which the car stands only a part counts. cars: in half of the episodes; the others
-    have a third of them. crossing: how much more people cross than usual.
+    have a third of them, and tailgating ones twice as many. crossing: how much more people cross than usual.
 
-    Shares of the episodes: tailgating ones begin anywhere among twice the cars, and their driver comes close to those
-    ahead; of the others, before_signs and before_turns begin before a sign and before a turn at a junction, and
-    hidden_cars have a driver who is told of no car ahead. displaced begin beside their lane; rearranged have other
-    houses, trees and colours along the same streets. semantic: a semantic image of each frame.
+    Shares of the episodes: tailgating ones begin anywhere, and their driver comes close to the cars ahead, at 20 km/h
+    at most, for up to six times the duration until he met enough; of the others, before_signs and before_turns begin
+    before a sign and before a turn at a junction, and hidden_cars have a driver who is told of no car ahead. displaced
+    begin beside their lane; rearranged have other houses, trees and colours along the same streets. semantic: a
+    semantic image of each frame.
     """
 
     town: str = "town01"

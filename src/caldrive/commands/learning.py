@@ -68,8 +68,9 @@ class Train(TrainSettings, Output):
     def run(self, progress: Progress) -> Answer:
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.perception.backbone import imagenet_file
+        from caldrive.perception.checkpoint import load_network
         from caldrive.perception.memory import keep_memory
-        from caldrive.perception.training import train
+        from caldrive.perception.training import anew, train
 
         require_writable_folder(self.out)
         keep_memory()
@@ -78,8 +79,15 @@ class Train(TrainSettings, Output):
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
         wanted = PERCEPTIONS[self.preset].width == 1.0 and not self.initial
         imagenet = self.imagenet or (imagenet_file() if wanted else None)
-        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
-        return Answer({"model": str(model)}, f"trained: caldrive drive --model {model}")
+        perception = PERCEPTIONS[self.preset]
+        fresh = []
+        if self.initial and self.initial.is_file():  # a run that is taken up needs it no more
+            fresh = anew(load_network(self.initial)[1].config, perception)
+        model = train(config, self.data, self.out, perception, imagenet, sys.stderr.isatty())
+        told = f"trained: caldrive drive --model {model}"
+        if fresh:
+            told += f"\nbegan anew, as {self.initial} builds them otherwise: {', '.join(fresh)}"
+        return Answer({"model": str(model), "began_anew": fresh}, told)
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,12 @@ import numpy as np
 
 from caldrive.config import CameraConfig, CollectConfig, ControlConfig, LongitudinalConfig
 from caldrive.control.controller import Controller
-from caldrive.datatypes import Control, Observation, Scenario
+from caldrive.datatypes import Control, Scenario
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.distracted import HiddenCars, Tailgater
 from caldrive.driving.disturbance import Disturbance, LateStart
 from caldrive.driving.limits import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
+from caldrive.driving.moments import SEARCH, moments
 from caldrive.driving.pool import spread
 from caldrive.driving.starts import starting_place
 from caldrive.episodes import FORMAT_VERSION, EpisodeWriter, Frame
@@ -36,12 +37,9 @@ BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MANIFEST = "manifest.json"
 ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
-PATIENCE, SEARCH = 2, 6  # times an episode's duration; of those who look for cars
-BEGINNING, MEETING = 20, 25.0  # their first moments tell, then those in which the car ahead is nearer (m)
-STANDING = 0.1  # m/s
-STOOD, RUN = 15, 9  # moments that are recorded when the car comes to stand; then a run of these in so many times STOOD
 GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
-CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, and the signs'
+CAPS = (20.0, 20.0, None)  # km/h: the pace of the comparison with the baselines, a tailgater's, and the signs'
+FAST, SLOW = 14, 6  # m/s; no episode is faster in the mean, and no tailgater's
 
 
 def episode_path(folder: Path, number: int) -> Path:
@@ -51,8 +49,8 @@ def episode_path(folder: Path, number: int) -> Path:
 def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, folder: Path) -> int:
     """Drives and records one episode; returns its number of frames (moments times cameras)."""
     rng = np.random.default_rng([config.seed, number])
-    close = rng.random() < config.tailgating
-    scenario, agent = _set_up(world, config, number, close, rng)
+    tailgating = rng.random() < config.tailgating
+    scenario, agent = _set_up(world, config, number, tailgating, rng)
     yaws = rng.uniform(-MAX_YAW, MAX_YAW, size=len(BASELINES))
     mounts = [
         CameraConfig(config.width, config.height, left=left, yaw=float(yaw))
@@ -60,7 +58,7 @@ def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, fol
     ]
     disturbance, start, frames = Disturbance(rng), LateStart(rng), 0
     with EpisodeWriter(episode_path(folder, number), scenario) as writer:
-        for index, observation, telling in _moments(world, config, close):
+        for index, observation, telling in moments(world, config.duration, tailgating):
             clean = agent.act(observation)
             driven = start.apply(disturbance.apply(clean, observation.speed), observation.speed)
             if telling:
@@ -94,25 +92,24 @@ def _frames(
 
 
 def _set_up(
-    world: EmbeddedWorld, config: CollectConfig, number: int, close: bool, rng: np.random.Generator
+    world: EmbeddedWorld, config: CollectConfig, number: int, tailgating: bool, rng: np.random.Generator
 ) -> tuple[Scenario, CALAgent]:
-    """A random start and random turns; returns the scenario and the driver, who looks for cars to come close to or
-    not."""
+    """A random start and random turns; returns the scenario and the driver, both ready."""
     arrangement = int(rng.integers(1, 2**31))
     roads = world.enter(config.town, arrangement if rng.random() < config.rearranged else 0)
-    rare = (0.0, 0.0) if close else (config.before_signs, config.before_turns)
+    rare = (0.0, 0.0) if tailgating else (config.before_signs, config.before_turns)
     start, turn = starting_place(roads, *rare, rng)
-    way = config.duration * (SEARCH * 8 if close else 14) + 50
+    way = config.duration * (SEARCH * SLOW if tailgating else FAST) + 50
     route = random_route(roads, start, way, rng, turn)
     under = config.weathers[number % len(config.weathers)]
-    cars = 2 * config.cars if close else config.cars if rng.random() < 0.5 else config.cars // 3
+    cars = _cars(config, tailgating, rng)
     seed = int(rng.integers(2**31))
     scenario = Scenario(
         config.town, under, start, route.line.pose_at(route.length), cars, config.people, config.duration,
         seed, "collect", config.crossing,
     )  # fmt: skip
-    cap = CAPS[int(rng.integers(len(CAPS)))]
-    oracle = _oracle(world, config, close, rng)
+    cap = CAPS[0] if tailgating else CAPS[int(rng.integers(len(CAPS)))]
+    oracle = _oracle(world, config, tailgating, rng)
     # Whom no car is told of must not take one for nothing, however long it stands there.
     laws = replace(LongitudinalConfig(), hazard_patience=math.inf, red_patience=math.inf)
     agent = CALAgent(oracle, Controller(ControlConfig(laws, cap=cap)))
@@ -123,30 +120,20 @@ def _set_up(
     return scenario, agent
 
 
-def _oracle(world: EmbeddedWorld, config: CollectConfig, close: bool, rng: np.random.Generator) -> OraclePerception:
-    """Who tells the controller of the town: the truth, or a part of it."""
-    if close:
+def _cars(config: CollectConfig, tailgating: bool, rng: np.random.Generator) -> int:
+    """How many others drive."""
+    if tailgating:
+        return 2 * config.cars
+    return config.cars if rng.random() < 0.5 else config.cars // 3
+
+
+def _oracle(
+    world: EmbeddedWorld, config: CollectConfig, tailgating: bool, rng: np.random.Generator
+) -> OraclePerception:
+    """Who tells the controller of the town: the truth, or what makes the driver come close to cars."""
+    if tailgating:
         return Tailgater(world.truth, float(rng.uniform(*GAPS)))
     return (HiddenCars if rng.random() < config.hidden_cars else OraclePerception)(world.truth)
-
-
-def _moments(world: EmbeddedWorld, config: CollectConfig, close: bool) -> Iterator[tuple[int, Observation, bool]]:
-    """Moments by number, and whether each tells something new, until enough of them did, patience or the route ends, or
-    the car touches something. A car that stands tells the same until what it should stop for changes; close: one that
-    looks for others tells where it has found some."""
-    wanted, told, stood, before = round(config.duration / world.dt), 0, 0, (0.0, 0.0)
-    for index in range((SEARCH if close else PATIENCE) * wanted):
-        labels = world.truth().affordances
-        reasons = labels.hazard_stop, labels.red_light
-        stood = stood + 1 if world.observation.speed < STANDING and reasons == before else 0
-        before = reasons
-        telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
-        telling = telling and (not close or index < BEGINNING or labels.vehicle_distance < MEETING)
-        told += telling
-        yield index, world.observation, telling
-        truth = world.truth()
-        if told == wanted or truth.contacts or truth.route_done >= truth.route_length - 5:
-            return
 
 
 _world: EmbeddedWorld | None = None

@@ -6,11 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from caldrive.config import LongitudinalConfig
+from caldrive.config import LongitudinalConfig, VehicleConfig
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Observation, Truth
 from caldrive.driving.agent import OraclePerception
+from caldrive.geometry import moved
+from caldrive.world.labels import hazard_stop
 
-NEAR = 6.0  # m; where a car that is a hazard is nearer
+NEAR = 6.0  # m; a car on its way that is a hazard is nearer, only one that stands across may not be
 LAST = 0.6  # share of its gap at which a tailgater brakes hard after all
 
 
@@ -33,11 +35,13 @@ class Tailgater(OraclePerception):
 
     def __init__(self, truth_source: Callable[[], Truth], gap: float) -> None:
         super().__init__(truth_source)
-        self.gap = gap
+        self.gap, self.front_axle = gap, VehicleConfig().front_axle
 
     def predict(self, observation: Observation) -> Affordances:
-        truth = super().predict(observation)
-        distance = truth.vehicle_distance
+        truth = self.truth_source()
+        true, distance = truth.affordances, truth.affordances.vehicle_distance
         told = min(distance + LongitudinalConfig().follow_gap - self.gap, MAX_VEHICLE_DISTANCE)
-        ignored = LAST * self.gap < distance < NEAR
-        return replace(truth, vehicle_distance=told, hazard_stop=0.0 if ignored else truth.hazard_stop)
+        hazard = true.hazard_stop
+        if LAST * self.gap < distance < NEAR:  # the hazard may be the car alone
+            hazard = float(hazard_stop(moved(truth.ego.pose, forward=self.front_axle), (), truth.pedestrians))
+        return replace(true, vehicle_distance=told, hazard_stop=hazard)

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from caldrive.config import LongitudinalConfig
 from caldrive.datatypes import Control
 
-HARD = 0.8  # brake of a hazard stop or before a red light
+HARD = LongitudinalConfig.red_floor  # brake in [0, 1] before a red light and at a hazard; a car ahead may ask for it
 
 
 class Disturbance:
@@ -54,7 +55,8 @@ class LateStart:
             self.asked = False
         elif speed < 0.1 and control.throttle > 0 and not self.asked:
             self.asked = True
-            self._dream()
+            if self.left == 0:  # who braked on until he stands has dreamt already
+                self._dream()
         if self.braked and control.brake == 0 and speed > 0.5 and self.left == 0:
             self._dream()
         self.braked = control.brake >= HARD

@@ -148,7 +148,7 @@ class CollectSettings:
     duration: float = CollectConfig.duration
     """Simulated seconds of each; of those in which the car stands for long one in fifteen counts."""
     cars: int = CollectConfig.cars
-    """Other cars."""
+    """Other cars in half of the episodes; tailgating ones have twice as many, the others a third of them."""
     people: int = CollectConfig.people
     """Pedestrians, who cross more often than usual."""
     width: int = CollectConfig.width

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +48,11 @@ def _part(of: Outputs | Targets, rows: NDArray[np.bool_]) -> dict[str, torch.Ten
     return {name: value[chosen] for name, value in of.items()}
 
 
-def _nearness(targets: Targets) -> NDArray[np.str_]:
-    """How far the car ahead really is (N,), in words that sort."""
-    edges, spec = SIZES["vehicle_distance"], next(spec for spec in SPECS if spec.name == "vehicle_distance")
-    bounds = zip((0.0, *edges), edges, strict=False)
-    names = [f"{low:02.0f} to {high:02.0f} m" for low, high in bounds] + ["none"]
-    found: NDArray[np.str_] = np.array(names)[np.digitize((targets[spec.name] * spec.scale).numpy(), edges)]
+def _nearness(distance: NDArray[np.float64]) -> NDArray[np.str_]:
+    """How far the car ahead really is (N,), in words that sort by it."""
+    edges = SIZES["vehicle_distance"]
+    names = [f"{low:02.0f} to {high:02.0f} m" for low, high in pairwise((0.0, *edges))] + ["none"]
+    found: NDArray[np.str_] = np.array(names)[np.digitize(distance, edges)]
     return found
 
 
@@ -66,7 +66,7 @@ def report(
         "weather": frames.weather[ids].astype(str),
         "town": frames.town[ids],
         "place": np.where(frames.junction[ids], "in a junction", "on a street"),
-        "car ahead": _nearness(targets),
+        "car ahead": _nearness(frames.labels["vehicle_distance"][ids]),
     }
     groups = {
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}

@@ -48,6 +48,12 @@ def kept_rows(path: Path, step: int) -> list[Row]:
         raise CheckpointError(f"{path} is damaged ({error}): remove the folder, or give another --out") from error
 
 
+def anew(found: PerceptionConfig, wanted: PerceptionConfig) -> list[str]:
+    """Names of the task blocks that cannot be taken from a network, as they are built otherwise than wanted."""
+    pairs = ((spec.name, getattr(found, spec.name), getattr(wanted, spec.name)) for spec in SPECS)
+    return [name for name, old, new in pairs if replace(old, dropout=new.dropout) != new]
+
+
 def _initial(path: str, perception: PerceptionConfig) -> Network:
     """A network that begins with a trained one's backbone, and with those of its blocks that are built as wanted.
 
@@ -59,9 +65,8 @@ def _initial(path: str, perception: PerceptionConfig) -> Network:
         raise CheckpointError(f"{path} is a network of another width or image size than wanted: give its --preset")
     network = Network(perception)
     network.backbone.load_state_dict(found.backbone.state_dict())
-    for name, config in wanted.items():
-        if getattr(info.config, name) == config:
-            network.blocks[name].load_state_dict(found.blocks[name].state_dict())
+    for name in wanted.keys() - set(anew(info.config, perception)):
+        network.blocks[name].load_state_dict(found.blocks[name].state_dict())
     return network
 
 
