@@ -221,7 +221,7 @@ def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
     assert contents(tmp_path) == contents(unbroken)
 
 
-def test_a_tailgater_drives_among_twice_the_cars_and_is_told_something_else(tmp_path: Path) -> None:
+def test_a_tailgater_drives_among_twice_the_cars_and_is_told_something_else() -> None:
     config, world = replace(TINY, before_signs=1.0), EmbeddedWorld()
     scenario, agent = collection._set_up(world, config, 0, True, np.random.default_rng(1))
     assert scenario.n_vehicles == 2 * config.cars

@@ -20,7 +20,7 @@ from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, learning_rate
 from caldrive.perception.precision import use_bf16
-from caldrive.perception.training import train
+from caldrive.perception.training import anew, train
 from tests.perception_data import HEIGHT, SHORT, TINY, WIDTH, record
 
 
@@ -76,6 +76,8 @@ def test_blocks_that_are_built_otherwise_begin_anew(folder: Path, tmp_path: Path
     assert {"backbone.stages.0.0.weight", "blocks.relative_angle.groups.0.layer.weight"} <= same
     assert "blocks.hazard_stop.groups.0.layer.weight" not in same
     assert second.blocks["hazard_stop"].config == longer.hazard_stop
+    assert anew(TINY, longer) == ["hazard_stop"]
+    assert anew(TINY, replace(TINY, red_light=replace(TINY.red_light, dropout=0.9))) == []
 
 
 def test_a_run_does_not_begin_with_a_network_of_another_kind(folder: Path, tmp_path: Path) -> None:

@@ -68,9 +68,8 @@ class Train(TrainSettings, Output):
     def run(self, progress: Progress) -> Answer:
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.perception.backbone import imagenet_file
-        from caldrive.perception.checkpoint import load_network
         from caldrive.perception.memory import keep_memory
-        from caldrive.perception.training import anew, train
+        from caldrive.perception.training import train
 
         require_writable_folder(self.out)
         keep_memory()
@@ -79,15 +78,21 @@ class Train(TrainSettings, Output):
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
         wanted = PERCEPTIONS[self.preset].width == 1.0 and not self.initial
         imagenet = self.imagenet or (imagenet_file() if wanted else None)
-        perception = PERCEPTIONS[self.preset]
-        fresh = []
-        if self.initial and self.initial.is_file():  # a run that is taken up needs it no more
-            fresh = anew(load_network(self.initial)[1].config, perception)
-        model = train(config, self.data, self.out, perception, imagenet, sys.stderr.isatty())
+        began_anew = self._began_anew()
+        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
         told = f"trained: caldrive drive --model {model}"
-        if fresh:
-            told += f"\nbegan anew, as {self.initial} builds them otherwise: {', '.join(fresh)}"
-        return Answer({"model": str(model), "began_anew": fresh}, told)
+        if began_anew:
+            told += f"\nbegan anew, as {self.initial} builds them otherwise: {', '.join(began_anew)}"
+        return Answer({"model": str(model), "began_anew": began_anew}, told)
+
+    def _began_anew(self) -> list[str]:
+        """The task blocks that --initial does not give; none where a run is taken up that needs its file no more."""
+        from caldrive.perception.checkpoint import load_network
+        from caldrive.perception.training import anew
+
+        if self.initial is None or not self.initial.is_file():
+            return []
+        return anew(load_network(self.initial)[1].config, PERCEPTIONS[self.preset])
 
 
 @dataclass(frozen=True)

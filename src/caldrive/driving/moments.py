@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
-from caldrive.datatypes import Observation, Truth
+from caldrive.datatypes import Observation
+from caldrive.world.embedded import EmbeddedWorld
 
 PATIENCE, SEARCH = 2, 6  # times the wanted duration that a drive may last; of a tailgater, who has to find a car
 BEGINNING = 6  # a tailgater's first moments tell, one in so many of those wanted, and later it takes a car
@@ -14,18 +14,7 @@ STANDING = 0.1  # m/s
 STOOD, RUN = 15, 9  # moments that tell when the car comes to stand; then a run of these in so many times STOOD
 
 
-class Drive(Protocol):
-    """The part of a world that the moments are chosen by."""
-
-    dt: float
-
-    @property
-    def observation(self) -> Observation: ...
-
-    def truth(self) -> Truth: ...
-
-
-def moments(world: Drive, duration: float, tailgating: bool) -> Iterator[tuple[int, Observation, bool]]:
+def moments(world: EmbeddedWorld, duration: float, tailgating: bool) -> Iterator[tuple[int, Observation, bool]]:
     """Moments by number, and whether each tells something new, until `duration` (s) of them did, patience or the route
     ends, or the car touches something.
 

@@ -34,7 +34,7 @@ from caldrive.typed import read_json
 
 Row = dict[str, int | float]
 
-RANGED = 128  # frames on which the ranges of 8 bits are found
+RANGED = 512  # frames on which the ranges of 8 bits are found
 MODEL, STATE, METRICS, CURVES = "model.safetensors", "state.safetensors", "metrics.jsonl", "curves.png"
 
 
