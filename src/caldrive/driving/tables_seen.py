@@ -15,12 +15,12 @@ from caldrive.perception.report import PAPER, Report
 from caldrive.perception.specs import SPECS
 
 FIGURES = {  # the heads of the columns, the metric in each, and the factor to its unit
-    "hazard IoU %": ("hazard_stop/iou", 100.0),
-    "red IoU %": ("red_light/iou", 100.0),
-    "sign IoU %": ("speed_sign/iou", 100.0),
-    "ahead m": ("vehicle_distance/mae", 1.0),
-    "angle rad": ("relative_angle/mae", 1.0),
-    "centre m": ("center_distance/mae", 1.0),
+    "hazard\nIoU %": ("hazard_stop/iou", 100.0),
+    "red\nIoU %": ("red_light/iou", 100.0),
+    "sign\nIoU %": ("speed_sign/iou", 100.0),
+    "ahead\nm": ("vehicle_distance/mae", 1.0),
+    "angle\nrad": ("relative_angle/mae", 1.0),
+    "centre\nm": ("center_distance/mae", 1.0),
 }
 SCALES = {f"{spec.name}/mae": spec.scale for spec in SPECS}
 
@@ -57,16 +57,16 @@ def evaluation_table(found: Report, precision: str) -> Group:
     """Mean IoU and MAE over all frames, as the paper has them, and by command, weather and so on; confusions."""
     paper = {name: _papers(name) for name, _ in FIGURES.values()}
     table = Table("", *FIGURES, box=SIMPLE_HEAD)
-    rows = {
-        f"all {found.frames} frames, in {precision}": found.overall,
-        "the paper, in CARLA": paper,
-    }
+    for column in table.columns:
+        column.no_wrap = True
+    rows = {"all frames": found.overall, "the paper, in CARLA": paper}
     rows |= {f"{kind} {value}": figures for kind, values in found.groups.items() for value, figures in values.items()}
     for name, figures in rows.items():
         table.add_row(name, *(f"{factor * figures[metric]:.3g}" for metric, factor in FIGURES.values()))
     for name, figures in (("all, scaled", found.overall), ("the paper, scaled", paper)):
         table.add_row(name, *(_scaled(metric, figures) for metric, _ in FIGURES.values()))
-    return Group(table, *(_confusion(n, c) for n, c in found.confusion.items()))
+    head = Text(f"{found.frames} frames, in {precision}")
+    return Group(head, table, *(_confusion(n, c) for n, c in found.confusion.items()))
 
 
 def _confusion(name: str, counts: list[list[int]]) -> Table:
