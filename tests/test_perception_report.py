@@ -26,11 +26,12 @@ def frames(tmp_path: Path) -> Frames:
     with EpisodeWriter(tmp_path / "one.parquet", SCENARIO) as writer:
         for index, distance in enumerate(AHEAD):
             frame = make_frame(index)
-            writer.append(replace(frame, affordances=replace(frame.affordances, vehicle_distance=distance)))
+            affordances = replace(frame.affordances, vehicle_distance=distance)
+            writer.append(replace(frame, affordances=affordances, camera_yaw=-0.2 if index < 3 else 0.1))
     return Frames(find_episodes(tmp_path), (HEIGHT, WIDTH))
 
 
-def test_errors_are_told_apart_by_the_distance_of_the_car_ahead_and_by_place(frames: Frames) -> None:
+def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_yaw(frames: Frames) -> None:
     network = Network(TINY).eval()
     found = report(network, frames, network.features)
     assert found.frames == len(AHEAD)
@@ -47,4 +48,6 @@ def test_errors_are_told_apart_by_the_distance_of_the_car_ahead_and_by_place(fra
     assert 0 < inside.sum() < len(inside)
     wanted = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
     assert places == pytest.approx(wanted, rel=1e-4)
+    turned = {name: row["vehicle_distance/mae"] for name, row in found.groups["camera turned"].items()}
+    assert turned == pytest.approx({"05 to 10 °": wrong[3:].mean(), "10 to 15 °": wrong[:3].mean()}, rel=1e-4)
     assert set(found.groups["command"]) == {"left", "straight"}

@@ -69,7 +69,9 @@ class Frames:
             np.digitize(np.abs(np.concatenate([e.columns[name] for e in episodes])), edges)
             for name, edges in SIZES.items()
         ]
-        self.junction = np.concatenate([e.columns["junction"] for e in episodes])
+        self.junction, self.camera_yaw = (
+            np.concatenate([e.columns[name] for e in episodes]) for name in ("junction", "camera_yaw")
+        )
         # Each command asks for one thing inside a junction, for another before it.
         self._manoeuvre = 2 * self.command + self.junction
         speed, throttle = (np.concatenate([e.columns[name] for e in episodes]) for name in ("speed", "clean_throttle"))

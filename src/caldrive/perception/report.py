@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -29,12 +30,13 @@ PAPER = {
 }
 WORST = 4  # frames shown of each affordance
 APART = 30  # frames that lie at least between two of them
+TURNED = (5.0, 10.0, 15.01)  # degrees; a car looks straight ahead, cameras of a recording up to 15 aside
 
 
 @dataclass(frozen=True)
 class Report:
-    """frames: how many. overall: metrics by name. groups: by command, weather, town, place and distance of the car
-    ahead, the same for each value.
+    """frames: how many. overall: metrics by name. groups: by command, weather, town, place, distance of the car ahead
+    and how far the camera is turned, the same for each value.
     confusion: for each discrete affordance how many frames of each true class (rows) were seen as each (columns)."""
 
     frames: int
@@ -48,11 +50,10 @@ def _part(of: Outputs | Targets, rows: NDArray[np.bool_]) -> dict[str, torch.Ten
     return {name: value[chosen] for name, value in of.items()}
 
 
-def _nearness(distance: NDArray[np.float64]) -> NDArray[np.str_]:
-    """How far the car ahead really is (N,), in words that sort by it."""
-    edges = SIZES["vehicle_distance"]
-    names = [f"{low:02.0f} to {high:02.0f} m" for low, high in pairwise((0.0, *edges))] + ["none"]
-    found: NDArray[np.str_] = np.array(names)[np.digitize(distance, edges)]
+def _ranges(size: NDArray[np.float64], edges: Sequence[float], unit: str, beyond: str) -> NDArray[np.str_]:
+    """Between which edges each size (N,) lies, in words that sort by it; beyond: the word for those above the last."""
+    names = [f"{low:02.0f} to {high:02.0f} {unit}" for low, high in pairwise((0.0, *edges))] + [beyond]
+    found: NDArray[np.str_] = np.array(names)[np.digitize(size, edges)]
     return found
 
 
@@ -66,7 +67,8 @@ def report(
         "weather": frames.weather[ids].astype(str),
         "town": frames.town[ids],
         "place": np.where(frames.junction[ids], "in a junction", "on a street"),
-        "car ahead": _nearness(frames.labels["vehicle_distance"][ids]),
+        "car ahead": _ranges(frames.labels["vehicle_distance"][ids], SIZES["vehicle_distance"], "m", "none"),
+        "camera turned": _ranges(np.degrees(np.abs(frames.camera_yaw[ids])), TURNED, "°", "further"),
     }
     groups = {
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}
