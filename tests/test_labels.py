@@ -12,8 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.config import VehicleConfig
+from caldrive.control.controller import Controller
+from caldrive.control.presets import DEFAULT
 from caldrive.datatypes import (
     Affordances,
+    Command,
+    Control,
     LightState,
     PedestrianState,
     Points,
@@ -23,7 +27,8 @@ from caldrive.datatypes import (
     VehicleState,
 )
 from caldrive.geometry import Polyline, moved, to_world
-from caldrive.world.labels import label
+from caldrive.world.labels import label, light_area
+from caldrive.world.vehicle import EgoState, advance
 
 CAR = VehicleConfig()
 BUMPER = CAR.length / 2 - CAR.front_axle  # m from the front axle to the front bumper
@@ -44,10 +49,11 @@ class Scene:
     pedestrians: Sequence[PedestrianState] = ()
     lights: Sequence[TrafficLight] = ()
     signs: Sequence[Sign] = ()
+    speed: float = 5.0
 
     @property
     def label(self) -> Affordances:
-        ego = VehicleState(self.pose, 5.0, CAR.length, CAR.width, "ego")
+        ego = VehicleState(self.pose, self.speed, CAR.length, CAR.width, "ego")
         line = Polyline(self.route)
         return label(ego, CAR.front_axle, line, None, self.vehicles, self.pedestrians, self.lights, self.signs)
 
@@ -114,6 +120,25 @@ def test_lights_and_signs_count_only_for_the_traffic_that_they_face(degrees: flo
     heading = math.radians(degrees)
     assert Scene(lights=[light(10, -3, heading=heading)]).label.red_light == float(counts)
     assert (Scene(signs=[sign(10, -3, heading=heading)]).label.speed_sign == 60) is counts
+
+
+@pytest.mark.parametrize(("speed", "near"), [(0.0, 5.0), (3.0, 6.35), (5.0, 7.4), (20.0, 7.4)])
+def test_for_a_slow_car_lights_count_nearer_and_signs_do_not(speed: float, near: float) -> None:
+    assert Scene(lights=[light(near + CM, -3)], speed=speed).label.red_light == 1.0
+    assert Scene(lights=[light(near - CM, -3)], speed=speed).label.red_light == 0.0
+    assert Scene(signs=[sign(7.4 - CM, -3)], speed=speed).label.speed_sign is None
+
+
+@given(st.floats(0.0, 4.3), st.floats(0.0, 6.6))
+def test_who_brakes_for_a_light_below_15_kmh_stands_with_the_light_in_the_area(speed: float, further: float) -> None:
+    state, controller = EgoState(IN_LANE, speed), Controller(DEFAULT)
+    at = light_area(speed).near + 0.2 * speed + further  # seen for long enough to react
+    for _ in range(30):
+        ego = VehicleState(state.pose, state.speed, CAR.length, CAR.width, "ego")
+        found = label(ego, CAR.front_axle, Polyline(STRAIGHT), lights=[light(at, -3)])
+        assert found.red_light == float(at <= 14.0)
+        late = Control() if state.pose == IN_LANE else controller.step(found, state.speed, Command.STRAIGHT).control
+        state = advance(state, late, 0.1, CAR)
 
 
 def test_a_green_light_does_not_hide_a_red_one() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ from caldrive.datatypes import (
 )
 from caldrive.geometry import Polyline, box_corners, moved, polygon_distance, to_local, wrap_angle
 
+IN_VIEW = 5.0  # m from which on a light stands too high to be seen
+REACTION, BRAKE = 0.2, 6.0  # s and m/s²: what stopping before a light takes
 STRIP = 1.3  # m to either side of the route: half a car and some room
 FACING = math.radians(45)  # a sign or light counts for traffic that runs within this angle of the one it faces
 
@@ -61,12 +63,23 @@ def hazard_stop(axle: Pose, vehicles: Sequence[VehicleState], pedestrians: Seque
     return bool(A2.contains(to_local(axle, both)).any())
 
 
-def red_light(axle: Pose, lights: Sequence[TrafficLight]) -> bool:
-    """Whether a light that faces the ego and is not green stands in A1. Yellow counts, as it asks to stop."""
+def light_area(speed: float) -> Area:
+    """A1, and nearer than that what a car at this speed (m/s) can still stop in with the light in view.
+
+    A1 ends with the bumper 6.6 m before the line: who is slow and brakes there for a yellow light stands outside it,
+    where no affordance would tell him of the red one that follows.
+    """
+    return replace(A1, near=min(A1.near, IN_VIEW + REACTION * speed + speed**2 / (2 * BRAKE)))
+
+
+def red_light(axle: Pose, lights: Sequence[TrafficLight], speed: float) -> bool:
+    """Whether a light that faces the ego and is not green stands in the area for this speed (m/s). Yellow counts, as it
+    asks to stop."""
+    area = light_area(speed)
     for light in lights:
         if light.state is LightState.GREEN or abs(wrap_angle(light.pose.heading - axle.heading)) > FACING:
             continue
-        if A1.contains(to_local(axle, np.array([light.pose.x, light.pose.y]))):
+        if area.contains(to_local(axle, np.array([light.pose.x, light.pose.y]))):
             return True
     return False
 
@@ -131,7 +144,7 @@ def label(
     vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, s)]
     return Affordances(
         hazard_stop=float(hazard_stop(axle, vehicles, pedestrians)),
-        red_light=float(red_light(axle, lights)),
+        red_light=float(red_light(axle, lights, ego.speed)),
         speed_sign=speed_sign(axle, signs),
         vehicle_distance=vehicle_distance(ego, axle, vehicles),
         relative_angle=angle,
