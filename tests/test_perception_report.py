@@ -49,5 +49,5 @@ def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_
     wanted = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
     assert places == pytest.approx(wanted, rel=1e-4)
     turned = {name: row["vehicle_distance/mae"] for name, row in found.groups["camera turned"].items()}
-    assert turned == pytest.approx({"05 to 10 °": wrong[3:].mean(), "10 to 15 °": wrong[:3].mean()}, rel=1e-4)
+    assert turned == pytest.approx({"05 to 10 °": wrong[3:].mean(), "10 ° and more": wrong[:3].mean()}, rel=1e-4)
     assert set(found.groups["command"]) == {"left", "straight"}

@@ -30,7 +30,7 @@ PAPER = {
 }
 WORST = 4  # frames shown of each affordance
 APART = 30  # frames that lie at least between two of them
-TURNED = (5.0, 10.0, 15.01)  # degrees; a car looks straight ahead, cameras of a recording up to 15 aside
+TURNED = (5.0, 10.0)  # degrees; a car looks straight ahead, cameras of a recording up to 15 aside
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def report(
         "town": frames.town[ids],
         "place": np.where(frames.junction[ids], "in a junction", "on a street"),
         "car ahead": _ranges(frames.labels["vehicle_distance"][ids], SIZES["vehicle_distance"], "m", "none"),
-        "camera turned": _ranges(np.degrees(np.abs(frames.camera_yaw[ids])), TURNED, "°", "further"),
+        "camera turned": _ranges(np.degrees(np.abs(frames.camera_yaw[ids])), TURNED, "°", "10 ° and more"),
     }
     groups = {
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}
