@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
 import json
 import re
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
+from caldrive.driving import report_page as page_module
 from caldrive.driving.report import BenchmarkRun, failures, load_run, load_runs
 from caldrive.driving.report_figures import _error_sums
 from caldrive.driving.report_page import report_page
@@ -182,6 +184,21 @@ def page(runs: list[BenchmarkRun], tmp_path_factory: pytest.TempPathFactory) -> 
         opened.goto(path.as_uri())
         yield opened
         browser.close()
+
+
+def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
+    runs: list[BenchmarkRun], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page_module, "MOST_STILLS", 1)
+    slow, breaker = runs[1].driven[4], runs[1].driven[9]
+    slow = replace(slow, result=replace(slow.result, infractions=()))
+    for one, width in ((slow, 40), (breaker, 41)):
+        picture = simplejpeg.encode_jpeg(np.full((20, width, 3), width, np.uint8))
+        (runs[1].folder / "stills" / f"{one.trial.key}-0.jpg").write_bytes(picture)
+    html = report_page([replace(runs[1], driven=(slow, breaker))])
+    (shown,) = re.findall(r"data:image/jpeg;base64,([^\"]+)", html)
+    (runs[1].folder / "stills" / f"{breaker.trial.key}-0.jpg").unlink()
+    assert simplejpeg.decode_jpeg(base64.b64decode(shown)).shape == (20, 41, 3)
 
 
 def column(page: Any, table: int, head: str) -> list[str]:

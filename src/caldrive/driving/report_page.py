@@ -14,7 +14,7 @@ from caldrive.driving.witness import still_paths
 from caldrive.results import Outcome
 
 _DATA = Path(__file__).parent / "data"
-MOST_STILLS = 400  # on one page; beyond that it would take too long to open
+MOST_STILLS = 120  # on one page, 3 MB or so; beyond that it would be long to open and large to keep
 
 
 def report_page(runs: Sequence[BenchmarkRun]) -> str:
@@ -64,16 +64,24 @@ def _failures(runs: Sequence[BenchmarkRun]) -> str:
         + "</select></label>"
         for name, values in choices.items()
     )
-    left = MOST_STILLS
-    cards = []
-    for one in found:
-        stills = still_paths(folders[one.run], one.episode.trial.key)[: max(0, left)]
-        left -= len(stills)
-        cards.append(_card(one, stills))
+    shown = _stills(found, folders)
+    cards = [_card(one, stills) for one, stills in zip(found, shown, strict=True)]
     text = (
-        f'<p><span id="shown">{len(found)}</span> of {len(found)} episodes that missed their goal or broke a rule.</p>'
+        f'<p><span id="shown">{len(found)}</span> of {len(found)} episodes that missed their goal or broke a rule.'
+        f" {sum(map(len, shown))} stills, first of those that broke a rule; all are beside the lines of a run.</p>"
     )
     return f'<section id="failures"><h2>Failures</h2>{text}<p class="menus">{menus}</p>{"".join(cards)}</section>'
+
+
+def _stills(found: Sequence[Failure], folders: dict[str, Path]) -> list[Sequence[Path]]:
+    """For each failure the stills to show, MOST_STILLS in all: who broke a rule goes before who only took too long."""
+    shown: list[Sequence[Path]] = [()] * len(found)
+    left = MOST_STILLS
+    for k in sorted(range(len(found)), key=lambda k: not found[k].episode.result.infractions):
+        one = found[k]
+        shown[k] = still_paths(folders[one.run], one.episode.trial.key)[:left]
+        left -= len(shown[k])
+    return shown
 
 
 def _card(failure: Failure, stills: Sequence[Path]) -> str:

@@ -20,6 +20,7 @@ from caldrive.world.embedded import EmbeddedWorld
 
 STILL = replace(CameraConfig(), width=480, height=212)
 MOST = 4  # stills of one episode; more would show the same once more
+JPEG = {"quality": 75, "colorspace": "RGB", "colorsubsampling": "420"}  # to be looked at, not learnt from
 
 
 def trace_path(folder: Path, key: str) -> Path:
@@ -74,5 +75,5 @@ class Witness:
         if result.outcome in (Outcome.TIMEOUT, Outcome.ABORTED) and len(stills) < MOST:
             stills += self.world.images([STILL])
         found = {str(trace_path(Path(), key)): gzip.compress(episode_json(result, self.trace), mtime=0)}
-        pictures = (simplejpeg.encode_jpeg(still, 85, colorspace="RGB") for still in stills)
+        pictures = (simplejpeg.encode_jpeg(still, **JPEG) for still in stills)
         return found | {f"stills/{key}-{k}.jpg": picture for k, picture in enumerate(pictures)}
