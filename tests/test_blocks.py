@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 
+from caldrive.config import BlockConfig
 from caldrive.perception import blocks
 from caldrive.perception.checkpoint import load_network, write_tensors
 from caldrive.perception.dataset import Frames
@@ -19,6 +20,7 @@ from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.precision import features_in
+from caldrive.perception.specs import SPECS
 from caldrive.perception.training import train
 from tests.perception_data import BLOCKS, HEIGHT, SHORT, TINY, WIDTH, record
 
@@ -41,13 +43,21 @@ def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path
     assert not (tmp_path / "after" / "features").exists()
 
 
-def test_only_the_blocks_change(folder: Path, tmp_path: Path) -> None:
+def test_only_blocks_that_look_back_change(folder: Path, tmp_path: Path) -> None:
     first = train(BLOCKS, folder, tmp_path, TINY, progress=False, stop=lambda step: step == 6)
     before = load_network(first)[0].state_dict()
     after = load_network(train(BLOCKS, folder, tmp_path, TINY, progress=False))[0].state_dict()
     changed = {name for name in before if not torch.equal(before[name], after[name])}
-    assert changed
-    assert all(name.startswith("blocks.") for name in changed)
+    back = tuple(f"blocks.{spec.name}." for spec in SPECS if getattr(TINY, spec.name).length > 1)
+    assert 0 < len(back) < len(SPECS)
+    assert all(any(name.startswith(one) for name in changed) for one in back)
+    assert all(name.startswith(back) for name in changed)
+
+
+def test_without_a_block_that_looks_back_there_is_no_such_lesson(folder: Path, tmp_path: Path) -> None:
+    now = {spec.name: BlockConfig("dense", 8) for spec in SPECS}
+    train(BLOCKS, folder, tmp_path, replace(TINY, **now), progress=False)
+    assert len((tmp_path / "metrics.jsonl").read_text().splitlines()) == BLOCKS.steps
 
 
 def test_until_the_blocks_learn_alone_they_see_no_history(folder: Path, tmp_path: Path) -> None:
@@ -60,7 +70,7 @@ def test_until_the_blocks_learn_alone_they_see_no_history(folder: Path, tmp_path
     assert evaluate(network, held, "fp32") == info.metrics
 
 
-@pytest.mark.parametrize("place", ["_see", "_lesson"])
+@pytest.mark.parametrize("place", ["_see", "learning_rate"])
 def test_a_run_killed_while_the_blocks_learn_resumes_to_the_same_network(
     place: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,7 +90,7 @@ def test_a_run_killed_while_the_blocks_learn_resumes_to_the_same_network(
     assert list((tmp_path / "killed" / "features").iterdir())
     resumed = train(BLOCKS, folder, tmp_path / "killed", TINY, progress=False)
     assert resumed.read_bytes() == whole.read_bytes()
-    assert len(calls) == {"_see": 5, "_lesson": 8}[place]  # 160 frames in chunks of 50; what was seen is kept
+    assert len(calls) == {"_see": 5, "learning_rate": 8}[place]  # 160 frames in chunks of 50; what was seen is kept
 
 
 def test_a_finished_run_stays_as_it_is(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

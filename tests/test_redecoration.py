@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from caldrive.config import CameraConfig
-from caldrive.datatypes import VehicleState
+from caldrive.datatypes import Sign, VehicleState
 from caldrive.world.camera import Camera
 from caldrive.world.decor import TOWNS
-from caldrive.world.redecoration import GROUND_FLOOR, N_DESIGNS, PAVINGS, UPPER, YARDS, redecorated
+from caldrive.world.embedded import EmbeddedWorld
+from caldrive.world.redecoration import GROUND_FLOOR, N_DESIGNS, PAVINGS, UPPER, YARDS, redecorated, shown_signs
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import build_scenery
 from caldrive.world.textures import Tex
@@ -44,6 +45,25 @@ def test_what_only_town02_is_built_of_is_in_no_made_up_decor() -> None:
     made_up = redecorated("town01", 3)
     assert not own & {layer for design in made_up.designs for layer in (design.upper, design.ground, design.roof)}
     assert not own & {crown.layer for crown in made_up.crowns}
+
+
+def test_of_the_limits_only_the_fast_ones_differ(roads: RoadNetwork) -> None:
+    assert shown_signs(roads.signs, 0) == roads.signs
+    fast = {30: {30}, 60: {60, 90}, 90: {60, 90}}
+    seen: dict[Sign, set[int]] = {sign: set() for sign in roads.signs}
+    for number in range(1, 40):
+        for own, shown in zip(roads.signs, shown_signs(roads.signs, number), strict=True):
+            assert shown.pose == own.pose
+            seen[own].add(shown.limit)
+    assert all(limits == fast[sign.limit] for sign, limits in seen.items())
+
+
+def test_the_limit_on_a_sign_is_the_one_that_counts(roads: RoadNetwork) -> None:
+    world = EmbeddedWorld()
+    world.enter("town01", 7)
+    drawn = {(prop.pose, prop.label) for prop in world.scenery if prop.kind == "sign_post"}
+    assert drawn == {(sign.pose, sign.limit) for sign in world.signs}
+    assert drawn != {(sign.pose, sign.limit) for sign in roads.signs}
 
 
 def test_houses_keep_two_floors_whatever_the_decor() -> None:

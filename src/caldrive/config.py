@@ -180,7 +180,7 @@ class PerceptionConfig:
     hazard_stop: BlockConfig = BlockConfig("tconv", 64, 0.25, length=5, dilation=2)
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
-    vehicle_distance: BlockConfig = BlockConfig("tconv", 64, 0.1, length=5, dilation=2)
+    vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
     relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
     center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
 
@@ -209,9 +209,9 @@ class TrainingConfig:
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
     segmentation: weight of the second lesson's loss, where the recording has semantic images; 0 leaves it out.
-    block_steps: after the others, steps in which the task blocks learn alone, from block_batch windows with their
-    history, whose frames the finished backbone saw once; until then a window is seen as if its stream began there. 0:
-    the blocks see their history from the first step on.
+    block_steps: after the others, steps in which the task blocks that look back learn alone, from block_batch windows
+    with their history, whose frames the finished backbone saw once; until then a window is seen as if its stream began
+    there. 0: the blocks see their history from the first step on.
     balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
     cache_gb: decoded images are kept in memory up to this size. precision: auto, fp32 or bf16. device: cpu, cuda, or
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.

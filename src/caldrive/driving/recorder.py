@@ -101,7 +101,7 @@ def _way(
     arrangement = int(rng.integers(1, 2**31))
     roads = world.enter(config.town, arrangement if rng.random() < config.rearranged else 0)
     rare = (0.0, 0.0) if tailgating else (config.before_signs, config.before_turns)
-    start, turn = starting_place(roads, *rare, rng)
+    start, turn = starting_place(roads, world.signs, *rare, rng)
     length = config.duration * (SEARCH * SLOW if tailgating else FAST) + 50
     route = random_route(roads, start, length, rng, turn)
     scenario = Scenario(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from caldrive.datatypes import Command, Pose
+from caldrive.datatypes import Command, Pose, Sign
 from caldrive.world.redecoration import one_of
 from caldrive.world.roads import Lane, RoadNetwork
 
@@ -12,15 +14,15 @@ BEFORE_SIGN, BEFORE_TURN = (15.0, 45.0), (2.0, 25.0)  # m
 
 
 def starting_place(
-    roads: RoadNetwork, before_signs: float, before_turns: float, rng: np.random.Generator
+    roads: RoadNetwork, signs: Sequence[Sign], before_signs: float, before_turns: float, rng: np.random.Generator
 ) -> tuple[Pose, str | None]:
     """Anywhere on the roads, or in a share of the cases some way before a sign or a turn at a junction; each limit and
     each command gets as many of these. Returns the place, and the lane of that turn if any."""
     chance = rng.random()
-    limits = sorted({sign.limit for sign in roads.signs})
+    limits = sorted({sign.limit for sign in signs})
     if limits and chance < before_signs:
         limit = one_of(limits, rng)
-        sign = one_of([sign for sign in roads.signs if sign.limit == limit], rng)
+        sign = one_of([sign for sign in signs if sign.limit == limit], rng)
         lane, at = roads.lane_at(sign.pose)
         return _upstream(roads, lane, at - float(rng.uniform(*BEFORE_SIGN))), None
     turns = [lane for lane in roads.lanes.values() if lane.turn is not None]

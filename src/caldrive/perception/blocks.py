@@ -1,8 +1,10 @@
-"""The last part of a training: the task blocks learn alone, from what the finished backbone makes of the frames.
+"""The last part of a training: task blocks that look back learn alone, from what the finished backbone makes of the
+frames.
 
 A frame with its history costs the backbone as many passes as the history has frames. A finished backbone passes each
 frame of the recording once, in the precision in which it drives; after that a step of the blocks, with history, takes
-a hundredth of the time of a step with images.
+a hundredth of the time of a step with images. But those images were augmented, and these features are not: blocks of
+one frame would learn nothing new here and forget what other pictures look like, and so they stay as they are.
 """
 
 from __future__ import annotations
@@ -16,15 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 from torch.optim import Adam
 
 from caldrive.perception.backbone import Backbone
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, read_tensors, round_to_half, write_tensors
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.network import Network
 from caldrive.perception.optimisation import TrainingRun, learning_rate
 from caldrive.perception.precision import Features, driving_precision, features_in
 from caldrive.perception.specs import loss
@@ -83,12 +83,14 @@ def forget_features(out: Path) -> None:
 
 
 def learn_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
-    """Trains the blocks of the run's network on features (N, F) of all its frames; yields each step's loss."""
+    """Trains the run's network's blocks that look back on features (N, F) of all its frames; yields each step's
+    loss."""
     network, frames = run.network, run.sampler.frames
     config = replace(run.config, steps=run.config.block_steps)  # the rate's warm-up and cosine begin anew
     weights = {name: weight.cpu() for name, weight in run.weights.items()}
-    optimizer = Adam(network.blocks.parameters(), config.learning_rate)
-    network.blocks.train()
+    blocks = nn.ModuleDict({name: block for name, block in network.task_blocks().items() if block.config.length > 1})
+    optimizer = Adam(blocks.parameters(), config.learning_rate)
+    blocks.train()
     for step in range(config.block_steps):
         number = run.config.steps + step  # of the whole training
         torch.manual_seed(config.seed * 1_000_003 + number)  # dropout
@@ -96,18 +98,12 @@ def learn_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
         others = run.sampler.others(number, config.block_batch)
         for group in optimizer.param_groups:
             group["lr"] = learning_rate(step, config)
-        total = loss(*_lesson(network, frames, features, starts, others, config.window), weights)
+        ids = frames.windows(starts, config.window, network.span - 1)
+        command, targets = frames.lessons(ids[:, -config.window :], others)
+        seen = features[torch.from_numpy(ids)].float()
+        total = loss({name: block(seen, command) for name, block in blocks.items()}, targets, weights)
         optimizer.zero_grad(set_to_none=True)
         total.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(network.blocks.parameters(), config.clip)
+        torch.nn.utils.clip_grad_norm_(blocks.parameters(), config.clip)
         optimizer.step()
         yield float(total.detach())
-
-
-def _lesson(
-    network: Network, frames: Frames, features: Tensor, starts: Ids, others: NDArray[np.bool_], window: int
-) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-    """Outputs and targets of the windows that begin with these frames; others: those with another command."""
-    ids = frames.windows(starts, window, network.span - 1)
-    command, targets = frames.lessons(ids[:, -window:], others)
-    return network(features[torch.from_numpy(ids)].float(), command), targets

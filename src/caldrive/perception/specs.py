@@ -107,10 +107,10 @@ def class_weights(counts: Mapping[str, NDArray[np.float64]]) -> dict[str, Tensor
 
 
 def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> dict[str, Tensor]:
-    """Each affordance's loss: class-weighted cross-entropy, or mean absolute error of the scaled value (section
-    3.1)."""
+    """The loss of each affordance among the outputs: class-weighted cross-entropy, or mean absolute error of the scaled
+    value (section 3.1)."""
     result = {}
-    for spec in SPECS:
+    for spec in (spec for spec in SPECS if spec.name in outputs):
         output, target = outputs[spec.name].float(), targets[spec.name]
         if spec.discrete:
             weight = None if weights is None else weights[spec.name]
@@ -122,7 +122,7 @@ def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = No
 
 
 def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> Tensor:
-    """The whole network's loss: all six added."""
+    """The whole loss: those of all affordances added."""
     return torch.stack(list(losses(outputs, targets, weights).values())).sum()
 
 

@@ -147,13 +147,18 @@ def train(
             rows.append(_step(run, held, out, rows))
             board.add(rows[-1])
             bar.update(task, completed=run.step, note=f"loss {rows[-1]['loss']:.3f}")
-        if run.step == config.steps and config.block_steps and team.leads and not stop(run.step):
+        if run.step == config.steps and _looks_back(run) and team.leads and not stop(run.step):
             _finish(run, held, out, rows, board, bar)
     return out / MODEL
 
 
+def _looks_back(run: TrainingRun) -> bool:
+    """Whether there are steps for blocks that look back, and such blocks."""
+    return run.config.block_steps > 0 and run.network.span > 1
+
+
 def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: Board, bar: Progress) -> None:
-    """The blocks learn alone, unless they did already."""
+    """The blocks that look back learn alone, unless they did already."""
     last = run.config.steps + run.config.block_steps
     if any(row["step"] == last for row in kept_rows(out / METRICS, last)):
         forget_features(out)

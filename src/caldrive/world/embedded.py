@@ -32,7 +32,7 @@ from caldrive.world.contacts import Obstacle, obstacle_of, resolve
 from caldrive.world.labels import label
 from caldrive.world.lights import Lights
 from caldrive.world.pedestrians import Pedestrians
-from caldrive.world.redecoration import redecorated
+from caldrive.world.redecoration import redecorated, shown_signs
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.route import Route, plan_route
 from caldrive.world.scenery import build_scenery
@@ -113,7 +113,7 @@ class EmbeddedWorld:
     def enter(self, town: str, arrangement: int = 0) -> RoadNetwork:
         """Loads a town, if it is not the one already there, without starting an episode.
 
-        arrangement: of its houses, trees and colours, 0 for the town as it is.
+        arrangement: of its houses, trees, colours and fast limits, 0 for the town as it is.
         """
         if self._town != (town, arrangement):
             self._load(town, arrangement)
@@ -155,6 +155,7 @@ class EmbeddedWorld:
 
     def _load(self, town: str, arrangement: int) -> None:
         self.roads = load_town(town)
+        self.signs = shown_signs(self.roads.signs, arrangement)
         self.scenery = build_scenery(self.roads, arrangement)
         self._decor = redecorated(self.roads.style, arrangement)
         self.surface = Surface(self.roads)
@@ -163,7 +164,7 @@ class EmbeddedWorld:
             Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)
         ]
         self._solid_at = _places(self._solid)
-        self._signs_at = _places(self.roads.signs)
+        self._signs_at = _places(self.signs)
         self._solid_reach = np.array([np.hypot(o.length, o.width) / 2 for o in self._solid])
         if self._camera is not None:
             self._camera.close()
@@ -183,14 +184,14 @@ class EmbeddedWorld:
     def _limits_along(self, route: Route) -> list[tuple[float, float]]:
         """Where which limit begins along the route (m, km/h)."""
         found = [(0.0, self.roads.lanes[route.lanes[0][0]].limit)]
-        for sign in self.roads.signs:
+        for sign in self.signs:
             hit = route.line.project(sign.pose.x, sign.pose.y)
             if -7 < hit.left < -1 and abs(wrap_angle(hit.heading - sign.pose.heading)) < 0.5:
                 found.append((hit.s, float(sign.limit)))
         return sorted(found)
 
     def _label(self, ego: VehicleState) -> Affordances:
-        signs = [self.roads.signs[i] for i in _near(ego.pose, self._signs_at, SEEN)]
+        signs = [self.signs[i] for i in _near(ego.pose, self._signs_at, SEEN)]
         lights = [self.signals[i] for i in _near(ego.pose, self._lights_at, SEEN)]
         return label(
             ego, self.vehicle.front_axle, self.route.line, self.progress, self.vehicles, self.people, lights, signs

@@ -1,7 +1,8 @@
 """Decors made up at random: the same streets as if they lay in another town, for recordings that teach what a street
 looks like anywhere.
 
-No façade, paving, ground cover or crown of `town02` is in any of them.
+No façade, paving, ground cover or crown of `town02` is in any of them. Their fast roads have other limits, too: a
+network that knows every street by heart would tell 60 from 90 by the street.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.datatypes import Sign
 from caldrive.world.decor import TOWNS, Color, Crown, Decor, Design, Ground, Paint, Style
 from caldrive.world.meshes import RGB
 from caldrive.world.textures import Tex
 
 T = TypeVar("T")
 N_DESIGNS = 6
+FAST = (60, 90)  # km/h; junctions and corners keep their 30
 INVENTED = tuple(tex for tex in Tex if tex.name.startswith("INVENTED"))
 PAVINGS = (Tex.PLAIN, Tex.ASPHALT, Tex.SLABS, Tex.GRASS, Tex.TILES, Tex.PLATES, Tex.SETTS, Tex.PLANKS, Tex.CONCRETE)
 YARDS = (*PAVINGS, Tex.LEAVES)
@@ -37,6 +40,14 @@ def redecorated(town: str, arrangement: int) -> Decor:
         tuple(_crown(crown, rng) for crown in TOWNS["town01"].crowns), fence=_tint(rng, 80, 230, 0.3),
         sun=float(rng.uniform(-math.pi, math.pi)), arm=float(rng.choice([0.0, 0.5, 1.0, 1.5])),
     )  # fmt: skip
+
+
+def shown_signs(signs: Sequence[Sign], arrangement: int) -> tuple[Sign, ...]:
+    """A town's own signs for arrangement 0; else each 60 or 90 is any of the two."""
+    if not arrangement:
+        return tuple(signs)
+    rng = np.random.default_rng([20181030, arrangement])
+    return tuple(replace(sign, limit=one_of(FAST, rng)) if sign.limit in FAST else sign for sign in signs)
 
 
 def _range(rng: np.random.Generator, low: float, high: float, widest: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
 from caldrive.world.decor import Style
-from caldrive.world.redecoration import N_DESIGNS, redecorated
+from caldrive.world.redecoration import N_DESIGNS, redecorated, shown_signs
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 
 SETBACK = 1.4  # m from the sidewalk to a façade
@@ -201,21 +201,22 @@ def _furniture(
             yield Prop(kinds[chosen[i]], pose, *_SIZES[kinds[chosen[i]]], variant=int(rng.integers(4)))
 
 
-def _posts(roads: RoadNetwork) -> Iterator[Prop]:
+def _posts(roads: RoadNetwork, arrangement: int) -> Iterator[Prop]:
     for post in roads.posts:
         yield Prop("light_post", post.pose, 0.2, 0.2, 3.5)
-    for sign in roads.signs:
+    for sign in shown_signs(roads.signs, arrangement):
         yield Prop("sign_post", sign.pose, 0.2, 0.2, 2.5, label=sign.limit)
 
 
 def build_scenery(roads: RoadNetwork, arrangement: int = 0) -> tuple[Prop, ...]:
     """All props of a town: posts first, then buildings, trees and furniture.
 
-    arrangement: 0 is the town as it is; others have the same streets and posts among other houses and trees.
+    arrangement: 0 is the town as it is; others have the same streets and posts among other houses and trees, and other
+    limits on the fast ones.
     """
     rng = np.random.default_rng([zlib.crc32(roads.name.encode()), *([arrangement] if arrangement else [])])
     style = redecorated(roads.style, arrangement).style
-    posts = tuple(_posts(roads))
+    posts = tuple(_posts(roads, arrangement))
     buildings = tuple(_buildings(roads, style, rng))
     trees = tuple(_trees(roads, style, posts, rng))
     return (*posts, *buildings, *trees, *_furniture(roads, posts, trees, rng))
