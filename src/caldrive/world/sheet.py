@@ -31,7 +31,7 @@ def viewpoints(roads: RoadNetwork) -> list[tuple[str, Pose]]:
         found.append(("light", lane.line.pose_at(max(0.0, lane.line.length - 13))))
     if roads.signs:
         sign = max(roads.signs, key=lambda s: s.limit)
-        found.append((f"sign {sign.limit}", moved(sign.pose, forward=-12, left=3.1)))
+        found.append(("sign", moved(sign.pose, forward=-12, left=3.1)))
     lane = max(roads.driveable, key=_bend)
     found.append(("bend", lane.line.pose_at(0.0)))
     return found
