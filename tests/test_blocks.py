@@ -70,7 +70,7 @@ def test_until_the_blocks_learn_alone_they_see_no_history(folder: Path, tmp_path
     assert evaluate(network, held, "fp32") == info.metrics
 
 
-@pytest.mark.parametrize("place", ["_see", "learning_rate"])
+@pytest.mark.parametrize("place", ["_see", "_lesson"])
 def test_a_run_killed_while_the_blocks_learn_resumes_to_the_same_network(
     place: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,7 +90,7 @@ def test_a_run_killed_while_the_blocks_learn_resumes_to_the_same_network(
     assert list((tmp_path / "killed" / "features").iterdir())
     resumed = train(BLOCKS, folder, tmp_path / "killed", TINY, progress=False)
     assert resumed.read_bytes() == whole.read_bytes()
-    assert len(calls) == {"_see": 5, "learning_rate": 8}[place]  # 160 frames in chunks of 50; what was seen is kept
+    assert len(calls) == {"_see": 5, "_lesson": 8}[place]  # 160 frames in chunks of 50; what was seen is kept
 
 
 def test_a_finished_run_stays_as_it_is(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

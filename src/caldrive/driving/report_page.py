@@ -14,7 +14,7 @@ from caldrive.driving.witness import still_paths
 from caldrive.results import Outcome
 
 _DATA = Path(__file__).parent / "data"
-MOST_STILLS = 120  # on one page, 3 MB or so; beyond that it would be long to open and large to keep
+MOST_STILLS = 120  # on one page; beyond that it would be long to open and large to keep
 
 
 def report_page(runs: Sequence[BenchmarkRun]) -> str:
@@ -68,7 +68,7 @@ def _failures(runs: Sequence[BenchmarkRun]) -> str:
     cards = [_card(one, stills) for one, stills in zip(found, shown, strict=True)]
     text = (
         f'<p><span id="shown">{len(found)}</span> of {len(found)} episodes that missed their goal or broke a rule.'
-        f" {sum(map(len, shown))} stills, first of those that broke a rule; all are beside the lines of a run.</p>"
+        f" {sum(map(len, shown))} stills, first of those that broke a rule; the folder of a run has all.</p>"
     )
     return f'<section id="failures"><h2>Failures</h2>{text}<p class="menus">{menus}</p>{"".join(cards)}</section>'
 

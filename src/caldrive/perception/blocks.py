@@ -85,25 +85,28 @@ def forget_features(out: Path) -> None:
 def learn_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
     """Trains the run's network's blocks that look back on features (N, F) of all its frames; yields each step's
     loss."""
-    network, frames = run.network, run.sampler.frames
     config = replace(run.config, steps=run.config.block_steps)  # the rate's warm-up and cosine begin anew
     weights = {name: weight.cpu() for name, weight in run.weights.items()}
-    blocks = nn.ModuleDict({name: block for name, block in network.task_blocks().items() if block.config.length > 1})
+    blocks = nn.ModuleDict({name: b for name, b in run.network.task_blocks().items() if b.config.length > 1})
     optimizer = Adam(blocks.parameters(), config.learning_rate)
     blocks.train()
     for step in range(config.block_steps):
         number = run.config.steps + step  # of the whole training
         torch.manual_seed(config.seed * 1_000_003 + number)  # dropout
-        starts = run.sampler.draw(number, config.block_batch)
-        others = run.sampler.others(number, config.block_batch)
         for group in optimizer.param_groups:
             group["lr"] = learning_rate(step, config)
-        ids = frames.windows(starts, config.window, network.span - 1)
-        command, targets = frames.lessons(ids[:, -config.window :], others)
-        seen = features[torch.from_numpy(ids)].float()
+        seen, command, targets = _lesson(run, features, number)
         total = loss({name: block(seen, command) for name, block in blocks.items()}, targets, weights)
         optimizer.zero_grad(set_to_none=True)
         total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(blocks.parameters(), config.clip)
         optimizer.step()
         yield float(total.detach())
+
+
+def _lesson(run: TrainingRun, features: Tensor, number: int) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
+    """The features (B, T, F), commands (B, S) and targets (B * S,) of a step of the whole training."""
+    sampler, window, batch = run.sampler, run.config.window, run.config.block_batch
+    ids = sampler.frames.windows(sampler.draw(number, batch), window, run.network.span - 1)
+    command, targets = sampler.frames.lessons(ids[:, -window:], sampler.others(number, batch))
+    return features[torch.from_numpy(ids)].float(), command, targets
