@@ -57,6 +57,13 @@ class Spec:
         """Outputs (N, 1) as values (N,) in SI units, clipped to the affordance's range."""
         return (output[:, 0].float() * self.scale).clamp(self.low, self.high)
 
+    def error(self, output: Tensor, target: Tensor) -> Tensor:
+        """Absolute errors (N,) of scaled outputs (N, 1). A target at a limit of the range stands for all beyond it, as
+        decoding does: an output there is right."""
+        beyond = (target >= self.high / self.scale) & (output[:, 0] > target)
+        beyond |= (target <= self.low / self.scale) & (output[:, 0] < target)
+        return (output[:, 0] - target).abs().masked_fill(beyond, 0.0)
+
 
 SPECS = (
     Spec("hazard_stop", classes=(0, 1)),
@@ -108,7 +115,7 @@ def class_weights(counts: Mapping[str, NDArray[np.float64]]) -> dict[str, Tensor
 
 def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> dict[str, Tensor]:
     """The loss of each affordance among the outputs: class-weighted cross-entropy, or mean absolute error of the scaled
-    value (section 3.1)."""
+    value (section 3.1), where a target at a limit stands for all beyond it."""
     result = {}
     for spec in (spec for spec in SPECS if spec.name in outputs):
         output, target = outputs[spec.name].float(), targets[spec.name]
@@ -117,7 +124,7 @@ def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = No
             # The mean over samples, not over weights: a batch's few rare samples must not take all of its gradient.
             result[spec.name] = functional.cross_entropy(output, target, weight, reduction="none").mean()
         else:
-            result[spec.name] = functional.l1_loss(output[:, 0], target)
+            result[spec.name] = spec.error(output, target).mean()
     return result
 
 
