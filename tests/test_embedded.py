@@ -7,10 +7,11 @@ import itertools
 import math
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import astuple, replace
 from multiprocessing import get_context
 from typing import Any
 
+import numpy as np
 import pytest
 
 from caldrive.config import CameraConfig, ControlConfig
@@ -18,10 +19,11 @@ from caldrive.control.controller import Controller
 from caldrive.datatypes import Command, ContactKind, Control, Pose, Scenario, Step, Truth
 from caldrive.driving.agent import CALAgent, OraclePerception
 from caldrive.driving.rollout import run_episode
-from caldrive.geometry import moved
+from caldrive.geometry import moved, to_local
 from caldrive.interfaces import Agent, World
 from caldrive.results import Outcome
 from caldrive.world.embedded import EmbeddedWorld
+from caldrive.world.optics import mounted
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.route import plan_route
 from caldrive.world.towns import load_town
@@ -189,12 +191,31 @@ def test_the_oracle_turns_left_at_a_light_and_breaks_no_rule(world: EmbeddedWorl
 def test_labels_beside_the_car_differ_by_what_the_camera_is_off(world: EmbeddedWorld) -> None:
     drive(world, along_the_street(n_vehicles=10, n_pedestrians=20), 30, Control(throttle=0.4))
     true = world.truth().affordances
-    assert world.labels_at(0.0, 0.0) == true
+    assert world.labels_at(CameraConfig()) == true
     for left in (-0.5, 0.5):
-        assert world.labels_at(left, 0.0).center_distance == pytest.approx(true.center_distance - left, abs=0.01)
-        assert world.labels_at(left, 0.0).relative_angle == pytest.approx(true.relative_angle, abs=0.01)
+        beside = world.labels_at(CameraConfig(left=left))
+        assert beside.center_distance == pytest.approx(true.center_distance - left, abs=0.01)
+        assert beside.relative_angle == pytest.approx(true.relative_angle, abs=0.01)
     for yaw in (-0.2, 0.2):
-        assert world.labels_at(0.0, yaw).relative_angle == pytest.approx(true.relative_angle - yaw, abs=0.01)
+        turned = world.labels_at(CameraConfig(yaw=yaw))
+        assert turned.relative_angle == pytest.approx(true.relative_angle - yaw, abs=0.01)
+
+
+@pytest.mark.parametrize("yaw", [-0.25, 0.1])
+def test_a_turned_camera_has_the_labels_of_a_car_whose_camera_takes_the_same_picture(
+    world: EmbeddedWorld, yaw: float
+) -> None:
+    drive(world, along_the_street(n_vehicles=10, n_pedestrians=20), 30, Control(throttle=0.4))
+    mount = CameraConfig(left=0.5, yaw=yaw)
+    mount = CameraConfig(left=0.5, yaw=yaw)
+    lens, labels = mounted(world.ego, mount).pose, world.labels_at(mount)
+    car = to_local(world.ego.pose, np.array([astuple(moved(lens, forward=-mount.forward))[:2]]))[0]
+    world.displace(float(car[1]), yaw)
+    own = mounted(world.ego, CameraConfig()).pose
+    assert to_local(lens, np.array([astuple(own)[:2]]))[0] == pytest.approx((-float(car[0]), 0.0), abs=0.06)
+    true = world.truth().affordances
+    assert true.center_distance == pytest.approx(labels.center_distance, abs=0.01)
+    assert true.relative_angle == pytest.approx(labels.relative_angle, abs=0.01)
 
 
 def test_two_episodes_of_one_scenario_are_equal(world: EmbeddedWorld) -> None:

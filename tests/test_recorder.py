@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from caldrive.config import CollectConfig
+from caldrive.config import CameraConfig, CollectConfig
 from caldrive.driving.distracted import Tailgater
 from caldrive.driving.recorder import BASELINES, _set_up, episode_path, record_episode
 from caldrive.episode_reader import Episode, read_episode
@@ -73,7 +73,7 @@ def test_each_camera_has_the_labels_of_its_own_place(episode: Episode) -> None:
         a, b = left.affordances, right.affordances
         straight = abs(a.relative_angle + left.camera_yaw) < 0.02
         if straight:
-            swing = 1.3 * (math.sin(left.camera_yaw) - math.sin(right.camera_yaw))
+            swing = (1.3 - CameraConfig().forward) * (math.sin(left.camera_yaw) - math.sin(right.camera_yaw))
             assert b.center_distance - a.center_distance == pytest.approx(1.0 + swing, abs=0.05)
         turned = a.relative_angle - b.relative_angle
         assert turned == pytest.approx(right.camera_yaw - left.camera_yaw, abs=0.15)

@@ -24,7 +24,7 @@ from caldrive.datatypes import Affordances, Alternative, Command, Control, Image
 from caldrive.files import write_whole
 from caldrive.scenarios import scenario_values
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 METADATA_KEY = b"caldrive"
 JPEG_QUALITY = 90
 LABELS = tuple(f.name for f in fields(Affordances))

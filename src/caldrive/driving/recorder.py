@@ -69,8 +69,8 @@ def _frames(
     semantics = world.semantic_images(mounts) if config.semantic else [None] * len(mounts)
     seen = zip(mounts, world.images(mounts), semantics, strict=True)
     for camera, (mount, image, semantic) in enumerate(seen):
-        labels = world.labels_at(mount.left, mount.yaw)
-        others = world.alternatives_at(mount.left, mount.yaw)
+        labels = world.labels_at(mount)
+        others = world.alternatives_at(mount)
         other = others[index % len(others)] if others else None
         yield Frame(
             index, observation.time, observation.speed, observation.command, labels, driven, clean, image, camera,

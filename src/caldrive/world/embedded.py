@@ -141,16 +141,15 @@ class EmbeddedWorld:
             self._camera = Camera(self.roads, self.scenery, self._decor)
         return self._camera
 
-    def labels_at(self, left: float, yaw: float) -> Affordances:
-        """The affordances of a car that stands `left` m beside the ego, turned by `yaw` (the three-camera set-up)."""
-        ego = self.ego
-        return self._label(replace(ego, pose=moved(ego.pose, left=left, turn=yaw)))
+    def labels_at(self, mount: CameraConfig) -> Affordances:
+        """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
+        return self._label(replace(self.ego, pose=_under(self.ego.pose, mount)))
 
-    def alternatives_at(self, left: float, yaw: float) -> list[Alternative]:
+    def alternatives_at(self, mount: CameraConfig) -> list[Alternative]:
         """What other commands would ask of such a car, where others could be given."""
         if self._forks is None:
             self._forks = forks(self.roads, self.route)
-        there = moved(self.ego.pose, left=left, turn=yaw)
+        there = _under(self.ego.pose, mount)
         return alternatives(moved(there, forward=self.vehicle.front_axle), self._forks, self.progress)
 
     def _load(self, town: str, arrangement: int) -> None:
@@ -234,3 +233,8 @@ def _places(things: Sequence[Obstacle] | Sequence[Sign] | Sequence[TrafficLight]
 def _near(here: Pose, places: Points, reach: float) -> list[int]:
     """Which places lie within a square around here."""
     return np.flatnonzero(np.abs(places - (here.x, here.y)).max(axis=1, initial=0.0) < reach).tolist()
+
+
+def _under(ego: Pose, mount: CameraConfig) -> Pose:
+    """Of the car whose camera, in the middle and straight ahead, would take the picture that this one takes."""
+    return moved(moved(ego, mount.forward, mount.left, mount.yaw), forward=-mount.forward)
