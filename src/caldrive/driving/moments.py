@@ -28,7 +28,7 @@ def moments(world: EmbeddedWorld, duration: float, tailgating: bool) -> Iterator
         stood = stood + 1 if world.observation.speed < STANDING and reasons == before else 0
         before = reasons
         telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
-        telling = telling and (not tailgating or index < wanted // BEGINNING or labels.vehicle_distance < MEETING)
+        telling = telling and (not tailgating or index < max(1, wanted // BEGINNING) or labels.vehicle_distance < MEETING)
         told += telling
         yield index, world.observation, telling
         truth = world.truth()

@@ -15,7 +15,7 @@ from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import INTEGERS, blocks_in, driving_precision, features_in
 from caldrive.perception.specs import decode
 
-DARK = 3  # no pixel of a working camera's image is as dark as this, even by night
+DARK = 3  # the brightest pixel of a working camera's image is brighter than this, even by night
 
 
 class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
