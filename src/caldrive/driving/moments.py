@@ -22,13 +22,14 @@ def moments(world: EmbeddedWorld, duration: float, tailgating: bool) -> Iterator
     street, and then where a car is near.
     """
     wanted, told, stood, before = round(duration / world.dt), 0, 0, (0.0, 0.0)
+    beginning = max(1, wanted // BEGINNING)
     for index in range((SEARCH if tailgating else PATIENCE) * wanted):
         labels = world.truth().affordances
         reasons = labels.hazard_stop, labels.red_light
         stood = stood + 1 if world.observation.speed < STANDING and reasons == before else 0
         before = reasons
         telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
-        telling = telling and (not tailgating or index < max(1, wanted // BEGINNING) or labels.vehicle_distance < MEETING)
+        telling = telling and (not tailgating or index < beginning or labels.vehicle_distance < MEETING)
         told += telling
         yield index, world.observation, telling
         truth = world.truth()
