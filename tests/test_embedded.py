@@ -207,7 +207,6 @@ def test_a_turned_camera_has_the_labels_of_a_car_whose_camera_takes_the_same_pic
 ) -> None:
     drive(world, along_the_street(n_vehicles=10, n_pedestrians=20), 30, Control(throttle=0.4))
     mount = CameraConfig(left=0.5, yaw=yaw)
-    mount = CameraConfig(left=0.5, yaw=yaw)
     lens, labels = mounted(world.ego, mount).pose, world.labels_at(mount)
     car = to_local(world.ego.pose, np.array([astuple(moved(lens, forward=-mount.forward))[:2]]))[0]
     world.displace(float(car[1]), yaw)
