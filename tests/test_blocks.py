@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -135,3 +136,11 @@ def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: P
         wanted = network.features(normalise(to_float(frames.images(np.arange(3)))))
     assert seen.dtype == torch.float16
     assert torch.allclose(seen[:3].float(), wanted, rtol=2e-3, atol=1e-3)
+
+
+def test_a_lesson_whose_loss_is_no_number_ends_with_a_sentence(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("caldrive.perception.training.learn_blocks", lambda *_: iter([1.0, math.nan]))
+    with pytest.raises(ValueError, match="found a loss of nan at step 8, wanted a number: type a smaller --rate"):
+        train(BLOCKS, folder, tmp_path, TINY, progress=False)

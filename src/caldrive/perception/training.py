@@ -168,7 +168,7 @@ def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: B
     features = feature_table(run, info, out, lambda n: bar.update(task, completed=n))
     task = bar.add_task("blocks", total=run.config.block_steps, note="")
     for step, loss in enumerate(learn_blocks(run, features), start=1):
-        rows.append({"step": run.config.steps + step, "loss": loss})
+        rows.append({"step": run.config.steps + step, "loss": _number(loss, run.config.steps + step)})
         board.add(rows[-1])
         bar.update(task, completed=step, note=f"blocks' loss {loss:.3f}")
     run.network.to(run.team.device)
@@ -179,12 +179,17 @@ def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: B
     forget_features(out)
 
 
+def _number(loss: float, step: int) -> float:
+    """The loss of a step. Raises ValueError where it is no number."""
+    if not math.isfinite(loss):
+        raise ValueError(f"found a loss of {loss} at step {step}, wanted a number: type a smaller --rate")
+    return loss
+
+
 def _step(run: TrainingRun, held: Frames, out: Path, rows: list[Row]) -> Row:
     """One step and what belongs after it; returns its row of the metrics."""
     config, began = run.config, time.perf_counter()
-    row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": run.advance()}
-    if not math.isfinite(row["loss"]):
-        raise ValueError(f"found a loss of {row['loss']} at step {run.step}, wanted a number: type a smaller --rate")
+    row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": _number(run.advance(), run.step)}
     row["windows_per_s"] = config.batch / (time.perf_counter() - began)
     last = run.step == config.steps
     if last or run.step % config.evaluate_every == 0:
