@@ -53,11 +53,18 @@ def make_frame(index: int, center_distance: float = 0.0, hazard: bool = False, c
     )  # fmt: skip
 
 
-def record(folder: Path, n_episodes: int = 3, n_frames: int = 40, n_cameras: int = 2, semantic: bool = False) -> Path:
+def record(
+    folder: Path,
+    n_episodes: int = 3,
+    n_frames: int = 40,
+    n_cameras: int = 2,
+    semantic: bool = False,
+    scenario: Scenario = SCENARIO,
+) -> Path:
     """Episodes whose column wanders, with a hazard now and then; semantic images of noise."""
     rng, classes = np.random.default_rng(0), np.random.default_rng(1)
     for episode in range(n_episodes):
-        with EpisodeWriter(folder / f"episode{episode}.parquet", SCENARIO) as writer:
+        with EpisodeWriter(folder / f"episode{episode}.parquet", scenario) as writer:
             for index in range(n_frames):
                 for camera in range(n_cameras):
                     frame = make_frame(index, float(rng.uniform(-1, 1)), bool(rng.random() < 0.15), camera)

@@ -8,12 +8,13 @@ import torch
 
 from caldrive.datatypes import Image, Observation
 from caldrive.episode_reader import read_episode
+from caldrive.interfaces import BadImage
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.dataset import Frames
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons
-from caldrive.perception.predictor import BadImage, NetworkPerception
+from caldrive.perception.predictor import NetworkPerception
 from caldrive.perception.specs import decode
 from tests.perception_data import HEIGHT, TINY, WIDTH, column_image, record, see, values
 

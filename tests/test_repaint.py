@@ -95,7 +95,5 @@ def test_training_paints_where_the_recording_tells_how(tmp_path: Path) -> None:
         steps=2, batch=4, warm_up=1, block_steps=0, segmentation=0.0, evaluate_every=9, precision="fp32",
         validation_share=0.3,
     )  # fmt: skip
-    first, second = (
-        train(config, tmp_path / name, tmp_path / f"out{name}", TINY, progress=False) for name in ("False", "True")
-    )
+    first, second = (train(config, tmp_path / name, tmp_path / f"out{name}", TINY) for name in ("False", "True"))
     assert first.read_bytes() != second.read_bytes()

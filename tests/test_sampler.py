@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from caldrive.perception.dataset import Frames
-from caldrive.perception.sampler import Sampler, every_window
+from caldrive.perception.sampler import Sampler
 from tests.perception_data import HEIGHT, WIDTH
 
 SIZE = (HEIGHT, WIDTH)
@@ -44,9 +44,3 @@ def test_half_of_the_windows_may_be_seen_with_another_command(frames: Frames) ->
     assert sampler.others(7, 1000).mean() == pytest.approx(0.5, abs=0.06)
     assert (sampler.others(7, 1000) == sampler.others(7, 1000)).all()
     assert (sampler.others(7, 1000) != sampler.others(8, 1000)).any()
-
-
-def test_validation_windows_cover_each_frame_once(frames: Frames) -> None:
-    starts = np.concatenate(list(every_window(frames, 5, batch=7)))
-    seen = (starts[:, None] + np.arange(5)).ravel()
-    assert sorted(seen.tolist()) == list(range(len(frames)))

@@ -32,7 +32,7 @@ def _member(rank: int, port: int, data: Path, out: Path) -> None:
     os.environ |= {"RANK": str(rank), "WORLD_SIZE": "2", "LOCAL_RANK": str(rank)}
     os.environ |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port)}
     torch.set_num_threads(1)
-    train(SHORT, data, out, PLAIN, progress=False)
+    train(SHORT, data, out, PLAIN)
 
 
 def test_two_processes_find_the_gradient_that_one_finds(tmp_path: Path) -> None:
@@ -43,7 +43,7 @@ def test_two_processes_find_the_gradient_that_one_finds(tmp_path: Path) -> None:
     members = [get_context("spawn").Process(target=_member, args=(k, port, data, tmp_path / "two")) for k in range(2)]
     for member in members:
         member.start()
-    train(SHORT, data, tmp_path / "one", PLAIN, progress=False)
+    train(SHORT, data, tmp_path / "one", PLAIN)
     for member in members:
         member.join(120)
     assert [member.exitcode for member in members] == [0, 0]

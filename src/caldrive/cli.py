@@ -16,7 +16,7 @@ from typing import Any
 import tyro
 
 from caldrive.commands import Answer, Command
-from caldrive.driving.settings import Progress, silent
+from caldrive.interfaces import Progress, silent
 
 DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None
@@ -73,13 +73,14 @@ def _progress() -> Iterator[Progress]:
         yield silent
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
+        TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("starting", total=1.0)

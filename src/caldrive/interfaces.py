@@ -1,7 +1,8 @@
-"""The three seams of caldrive: a world to drive in, a perception that looks, an agent that acts."""
+"""The seams of caldrive: a world to drive in, a perception that looks, an agent that acts, and who watches."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from caldrive.datatypes import Affordances, Control, Decision, Observation, Scenario, Truth
@@ -18,8 +19,12 @@ class World(Protocol):
     def close(self) -> None: ...
 
 
+class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
+    """An image tells nothing, or a perception makes nothing of it; the driver should brake."""
+
+
 class Perception(Protocol):
-    """Image to affordances. reset() starts an episode."""
+    """Image to affordances. reset() starts an episode; predict raises BadImage where the image is no use."""
 
     def reset(self) -> None: ...
     def predict(self, observation: Observation) -> Affordances: ...
@@ -32,3 +37,10 @@ class Agent(Protocol):
 
     def reset(self) -> None: ...
     def act(self, observation: Observation) -> Control: ...
+
+
+Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
+
+
+def silent(label: str, share: float) -> None:
+    """Progress that nobody follows."""

@@ -9,7 +9,8 @@ from pathlib import Path
 import tyro
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import BenchmarkSettings, Progress
+from caldrive.driving.settings import BenchmarkSettings
+from caldrive.interfaces import Progress
 
 
 @dataclass(frozen=True)

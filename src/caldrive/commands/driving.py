@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import DeterminismSettings, DriveSettings, Progress
+from caldrive.driving.settings import DeterminismSettings, DriveSettings
+from caldrive.interfaces import Progress
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
@@ -10,13 +9,14 @@ import tyro
 
 from caldrive.commands.answer import Answer, Output
 from caldrive.config import PERCEPTIONS, TRAININGS, CollectConfig, TrainingConfig
-from caldrive.driving.settings import CollectSettings, DataSettings, EvaluateSettings, Progress, TrainSettings
+from caldrive.driving.settings import CollectSettings, DataSettings, EvaluateSettings, TrainSettings
+from caldrive.interfaces import Progress
 
 
 @dataclass(frozen=True)
 class Collect(CollectSettings, Output):
     def run(self, progress: Progress) -> Answer:
-        from caldrive.driving.collection import collect
+        from caldrive.driving.collection import collect, missing
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.driving.tables import counts_table
         from caldrive.perception.folders import class_counts, find_episodes
@@ -24,8 +24,9 @@ class Collect(CollectSettings, Output):
         require_writable_folder(self.out)
         asked = {field.name: getattr(self, field.name) for field in fields(CollectConfig) if hasattr(self, field.name)}
         config = CollectConfig(**asked)
-        for done, _ in enumerate(collect(config, self.out, self.workers), start=1):
-            progress(f"recording, {done} done", done / self.episodes)
+        for _ in collect(config, self.out, self.workers):
+            there = self.episodes - len(missing(config, self.out))
+            progress(f"recording, {there} of {self.episodes} episodes", there / self.episodes)
         counts = class_counts(find_episodes(self.out))
         return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
 
@@ -69,17 +70,17 @@ class Train(TrainSettings, Output):
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.perception.backbone import imagenet_file
         from caldrive.perception.memory import keep_memory
-        from caldrive.perception.training import train
+        from caldrive.perception.training import begun, train
 
         require_writable_folder(self.out)
         keep_memory()
         config = self._config()
         if self.initial and self.imagenet:
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
-        wanted = PERCEPTIONS[self.preset].width == 1.0 and not self.initial
+        wanted = PERCEPTIONS[self.preset].width == 1.0 and not self.initial and not begun(self.out)
         imagenet = self.imagenet or (imagenet_file() if wanted else None)
         began_anew = self._began_anew()
-        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, sys.stderr.isatty())
+        model = train(config, self.data, self.out, PERCEPTIONS[self.preset], imagenet, progress)
         told = f"trained: caldrive drive --model {model}"
         if began_anew:
             told += f"\nbegan anew, as {self.initial} builds them otherwise: {', '.join(began_anew)}"

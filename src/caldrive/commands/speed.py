@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import AgentSpeedSettings, Progress, WorldSpeedSettings
+from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
+from caldrive.interfaces import Progress
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from caldrive.control.controller import Controller
 from caldrive.datatypes import Affordances, Control, Decision, Observation, Truth
-from caldrive.interfaces import Perception
+from caldrive.interfaces import BadImage, Perception
 
 NOTHING = Affordances(*(math.nan,) * 2, None, *(math.nan,) * 3)  # what an image tells that is no use
 
@@ -37,11 +37,7 @@ class CALAgent:
         """The affordances, or nothing and why."""
         try:
             return self.perception.predict(observation), ""
-        except ValueError as error:
-            from caldrive.perception.predictor import BadImage  # with torch, which the oracle does without
-
-            if not isinstance(error, BadImage):
-                raise
+        except BadImage as error:
             return NOTHING, str(error)
 
 

@@ -92,8 +92,9 @@ def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[t
     """
     _check(config, workers)
     _claim(folder, config)
-    yield from spread(partial(_record, config, folder), _missing(config, folder), workers)
+    yield from spread(partial(_record, config, folder), missing(config, folder), workers)
 
 
-def _missing(config: CollectConfig, folder: Path) -> list[int]:
+def missing(config: CollectConfig, folder: Path) -> list[int]:
+    """Numbers of the episodes that are not in a folder yet."""
     return [k for k in range(config.episodes) if not episode_path(folder, k).exists()]

@@ -11,7 +11,8 @@ from itertools import zip_longest
 from typing import Any
 
 from caldrive.datatypes import Step
-from caldrive.driving.settings import DeterminismSettings, Progress, silent
+from caldrive.driving.settings import DeterminismSettings
+from caldrive.interfaces import Progress, silent
 
 PARTS = ("image", "truth", "decision", "control")
 

@@ -15,10 +15,11 @@ from caldrive.driving.outputs import require_writable_folder
 from caldrive.driving.plots import draw_speed
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
-from caldrive.driving.settings import DriveSettings, Progress, silent
+from caldrive.driving.settings import DriveSettings
 from caldrive.driving.trace import Trace, episode_json, result_values
 from caldrive.driving.video import VideoWriter
 from caldrive.files import write_whole
+from caldrive.interfaces import Progress, silent
 from caldrive.results import EpisodeResult, Outcome
 
 

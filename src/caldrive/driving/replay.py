@@ -16,10 +16,11 @@ from caldrive.driving.ledger import RESULTS, read_lines, read_run, require_same_
 from caldrive.driving.outputs import require_writable_file
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
-from caldrive.driving.settings import DriverSettings, Progress, silent
+from caldrive.driving.settings import DriverSettings
 from caldrive.driving.suites import Trial, suite
 from caldrive.driving.trace import result_values
 from caldrive.driving.video import VideoWriter
+from caldrive.interfaces import Progress, silent
 from caldrive.results import EpisodeResult
 
 

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from caldrive.config import CollectConfig
-
-Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
-
-
-def silent(label: str, share: float) -> None:
-    """Progress that nobody follows."""
 
 
 @dataclass(frozen=True)

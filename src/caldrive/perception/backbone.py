@@ -33,7 +33,7 @@ def _read_state(path: Path) -> dict[str, Tensor]:
             state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
             return state
         return load_file(path)
-    except (OSError, SafetensorError, UnpicklingError, RuntimeError) as error:
+    except (OSError, EOFError, SafetensorError, UnpicklingError, RuntimeError) as error:
         raise ValueError(f"{path} is missing or no state dict of tensors: give a .safetensors or .pth file") from error
 
 
@@ -92,7 +92,7 @@ class Backbone(nn.Module):
         """
         if self.width != 1.0:
             raise ValueError(
-                f"ImageNet weights fit VGG16 at width 1, this backbone has {self.width:g}: set width to 1.0"
+                f"ImageNet weights fit VGG16 at width 1, this backbone has {self.width:g}: type --preset paper"
             )
         state = _read_state(Path(path))
         for number, conv in zip(IMAGENET_LAYERS, self.convolutions(), strict=True):

@@ -3,36 +3,40 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping, Sequence
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from caldrive.perception.backbone import Backbone
-from caldrive.perception.dataset import Frames
 from caldrive.perception.network import Network
-from caldrive.perception.specs import ClassWeights
 
 AT_ONCE = 16  # images
+Counts = Mapping[str, Sequence[int]]  # frames of each class (K,), by discrete affordance
 
 
-def calibrated(
-    network: Network, frames: Frames, drawn: dict[str, NDArray[np.float64]], weights: ClassWeights
-) -> Network:
+def calibrated(network: Network, counts: Counts) -> Network:
     """A copy of the network whose probabilities are those of the recording.
 
-    Weighted and balanced, training sees rare classes as often as the others, and so the network expects them. Moving
-    each class's last bias by the logarithm of (its share of the frames / its share of the loss) takes that back; about,
-    as frames are drawn by the rarest of their labels, not by each. drawn: how often each class was (K,), by affordance.
+    Weighted by the inverse of how often they are drawn, all classes count the same in training, and so the network
+    expects them alike. Moving each class's last bias by the logarithm of its share of the frames takes that back;
+    about, as frames are drawn by the rarest of their labels, not by each. counts: of the recording.
     """
+    return _moved(network, counts, 1.0)
+
+
+def uncalibrated(network: Network, counts: Counts) -> Network:
+    """A copy of a calibrated network as it was before, to be trained further. counts: those of its own recording."""
+    return _moved(network, counts, -1.0)
+
+
+def _moved(network: Network, counts: Counts, sign: float) -> Network:
     network = copy.deepcopy(network)
-    for name, weight in weights.items():
-        count = torch.bincount(frames.targets[name], minlength=len(weight)).double()
-        weighted = weight.cpu().double() * torch.from_numpy(drawn[name])
-        shift = (count / weighted).nan_to_num(0.0).clamp(min=1e-9).log()  # what never occurs is not expected
+    for name, count in counts.items():
+        frames = torch.tensor(count, dtype=torch.float64)
+        expected = (frames / frames.sum()).clamp(min=1e-9).log()  # what never occurs is not expected
         bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
-        bias.data += (shift - shift[0]).to(bias.device)
+        bias.data += sign * (expected - expected[0]).to(bias.device)
     return network
 
 

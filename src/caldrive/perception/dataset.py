@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -18,7 +19,8 @@ from torch import Tensor
 
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Command
 from caldrive.episode_reader import Episode
-from caldrive.episodes import LABELS, OTHER, EpisodeError
+from caldrive.episodes import LABELS, EpisodeError
+from caldrive.perception.folders import joined
 from caldrive.perception.specs import SPECS, encode_columns
 
 Ids = NDArray[np.int64]
@@ -48,36 +50,32 @@ class Batch:
 
 
 class Frames:
-    """The frames of some episodes, one after the other: labels, commands, images, and where each frame's stream begins.
+    """The frames of some episodes, one after the other: labels, commands, images, the moment of its episode that each
+    frame belongs to, and where its stream begins.
 
     A stream is what one camera saw of one episode without a gap. size: (height, width) of the images; images stay
-    decoded in memory where they take at most cache_gb. Raises EpisodeError where an image has another size.
+    decoded in memory where they take at most cache_gb. Images raise EpisodeError where they have another size.
     """
 
     def __init__(self, episodes: Sequence[Episode], size: tuple[int, int], cache_gb: float = 0.0) -> None:
         self.size = size
         self.episodes = tuple((e.key, len(e)) for e in episodes)
-        self.labels = {name: np.concatenate([e.columns[name] for e in episodes]) for name in LABELS}
-        words = np.concatenate([e.columns["command"] for e in episodes])
-        self.command = np.array([COMMAND_NUMBERS[word] for word in words], dtype=np.int64)
+        column = partial(joined, episodes)
+        self.labels = {name: column(name) for name in LABELS}
+        self.command = np.array([COMMAND_NUMBERS[word] for word in column("command")], dtype=np.int64)
         self.targets = encode_columns(self.labels)
-        words = np.concatenate([e.columns["other_command"] for e in episodes])
-        self.other_command = np.array([COMMAND_NUMBERS.get(word, NONE) for word in words], dtype=np.int64)
-        others = {name: np.concatenate([e.columns[f"other_{name}"] for e in episodes]) for name in OTHER}
-        self.other_targets = {s.name: s.encode(others[s.name]) for s in SPECS if s.conditional}
-        self._sizes = [
-            np.digitize(np.abs(np.concatenate([e.columns[name] for e in episodes])), edges)
-            for name, edges in SIZES.items()
-        ]
-        self.junction, self.camera_yaw = (
-            np.concatenate([e.columns[name] for e in episodes]) for name in ("junction", "camera_yaw")
+        self.other_command = np.array(
+            [COMMAND_NUMBERS.get(word, NONE) for word in column("other_command")], dtype=np.int64
         )
+        self.other_targets = {s.name: s.encode(column(f"other_{s.name}")) for s in SPECS if s.conditional}
+        self._sizes = [np.digitize(np.abs(column(name)), edges) for name, edges in SIZES.items()]
+        self.junction, self.camera_yaw, self.moment = (column(name) for name in ("junction", "camera_yaw", "frame"))
         # Each command asks for one thing inside a junction, for another before it.
         self._manoeuvre = 2 * self.command + self.junction
-        speed, throttle = (np.concatenate([e.columns[name] for e in episodes]) for name in ("speed", "clean_throttle"))
-        self._waiting = (speed < 0.1) & (throttle == 0)
-        self.stream_start = self._stream_starts(episodes)
+        self._waiting = (column("speed") < 0.1) & (column("clean_throttle") == 0)
         lengths = [len(e) for e in episodes]
+        self.episode = np.repeat(np.arange(len(episodes)), lengths)
+        self.stream_start = self._stream_starts(column("camera"))
         self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
         self.town = np.repeat([e.scenario.town for e in episodes], lengths)
         self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
@@ -92,15 +90,15 @@ class Frames:
 
     @property
     def digest(self) -> str:
-        """Tells these episodes from others."""
-        return hashlib.sha256(repr(self.episodes).encode()).hexdigest()[:16]
+        """Tells these episodes and their labels from others."""
+        found = hashlib.sha256(repr(self.episodes).encode())
+        for values in (self.command, self.other_command, *self.targets.values(), *self.other_targets.values()):
+            found.update(np.asarray(values).tobytes())
+        return found.hexdigest()[:16]
 
-    @staticmethod
-    def _stream_starts(episodes: Sequence[Episode]) -> Ids:
+    def _stream_starts(self, camera: Ids) -> Ids:
         """For each frame the number of its stream's first one."""
-        episode = np.repeat(np.arange(len(episodes)), [len(e) for e in episodes])
-        camera, frame = (np.concatenate([e.columns[name] for e in episodes]) for name in ("camera", "frame"))
-        follows = (np.diff(episode) == 0) & (np.diff(camera) == 0) & (np.diff(frame) == 1)
+        follows = (np.diff(self.episode) == 0) & (np.diff(camera) == 0) & (np.diff(self.moment) == 1)
         first = np.concatenate(([True], ~follows))
         return np.maximum.accumulate(np.where(first, np.arange(len(first)), 0))
 

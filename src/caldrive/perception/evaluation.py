@@ -8,11 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from caldrive.perception.dataset import Frames, Ids
+from caldrive.perception.dataset import Frames
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.precision import Features, autocast
-from caldrive.perception.sampler import every_window
 from caldrive.perception.specs import Outputs, Targets, losses, metrics
 
 BATCH = 128  # frames that are evaluated together
@@ -31,21 +30,20 @@ def outputs_on(
     device: str = "cpu",
     progress: Done = unwatched,
     context: int | None = None,
-) -> tuple[Ids, Outputs, Targets]:
-    """Numbers (N,) of all frames, outputs (N, K) and targets (N,) on them. features: the network's backbone; context:
-    frames of history that it sees, without it as many as its blocks look at."""
+) -> tuple[Outputs, Targets]:
+    """Outputs (N, K) and targets (N,) on all frames. features: the network's backbone; context: frames of history that
+    it sees, without it as many as its blocks look at."""
     network.eval()
     context = network.span - 1 if context is None else context
-    ids, outputs, targets = [], [], []
-    for starts in every_window(frames, 1, BATCH):
-        batch = frames.batch(starts, 1, context)
+    outputs, targets = [], []
+    for first in range(0, len(frames), BATCH):
+        batch = frames.batch(np.arange(first, min(first + BATCH, len(frames))), 1, context)
         seen = features(normalise(to_float(batch.images)).to(device)).float()
         outputs.append(network(seen[batch.index.to(device)], batch.command.to(device)))
-        ids.append(starts)
         targets.append(batch.targets)
-        progress(float(starts[-1]) / len(frames))
+        progress(first / len(frames))
     joined = {name: torch.cat([o[name].float().cpu() for o in outputs]) for name in outputs[0]}
-    return np.concatenate(ids), joined, {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
+    return joined, {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
 
 
 def evaluate(
@@ -57,6 +55,6 @@ def evaluate(
         with autocast(precision, device):
             return network.features(images)
 
-    _, outputs, targets = outputs_on(network, frames, features, device, context=context)
+    outputs, targets = outputs_on(network, frames, features, device, context=context)
     parts = {f"{name}/loss": float(value) for name, value in losses(outputs, targets).items()}
     return {"loss": sum(parts.values())} | parts | metrics(outputs, targets)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
@@ -29,11 +30,16 @@ def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
     return [read_episode(path, semantic) for path in episode_paths(folder)]
 
 
+def joined(episodes: Sequence[Episode], name: str) -> NDArray[Any]:
+    """A column (N,) of all episodes, one after the other."""
+    return np.concatenate([episode.columns[name] for episode in episodes])
+
+
 def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
     """How many frames of a recording have each value of the discrete affordances and of the command."""
     found = {}
     for name in (*(s.name for s in SPECS if s.discrete), "command"):
-        values, counts = np.unique(np.concatenate([e.columns[name] for e in episodes]), return_counts=True)
+        values, counts = np.unique(joined(episodes, name), return_counts=True)
         found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
     return found
 

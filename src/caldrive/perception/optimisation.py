@@ -25,7 +25,7 @@ from caldrive.perception.segmentation import STAGE, Segmentation, segmentation_l
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
 
-FREE = ("initial", "evaluate_every", "save_every", "cache_gb")  # may change while a training is under way
+FREE = ("initial", "evaluate_every", "save_every", "cache_gb", "device")  # may change while a training is under way
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -137,11 +137,12 @@ class TrainingRun:
     def restore(self, path: Path) -> None:
         """Take up where `save` left off. Raises CheckpointError where the file belongs to another run."""
         tensors, header = read_tensors(path)
-        same = _decisive(header.get("training", {})) == _decisive(asdict(self.config))
-        if not same or header.get("config") != asdict(self.network.config):
-            raise CheckpointError(
-                f"{path} belongs to a run with other settings: give another folder or remove this one"
-            )
+        found = _decisive(header.get("training", {})) | header.get("config", {})
+        for name, wanted in (_decisive(asdict(self.config)) | asdict(self.network.config)).items():
+            if found.get(name) != wanted:
+                raise CheckpointError(
+                    f"{path} belongs to a run with {name} {found.get(name)}, wanted {wanted}: give another --out"
+                )
         if header.get("episodes") != self.sampler.frames.digest:
             raise CheckpointError(
                 f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"

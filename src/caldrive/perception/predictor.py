@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from caldrive.datatypes import Affordances, Image, Observation
+from caldrive.interfaces import BadImage
 from caldrive.perception.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import COMMANDS, Network
@@ -16,10 +17,6 @@ from caldrive.perception.precision import INTEGERS, blocks_in, driving_precision
 from caldrive.perception.specs import decode
 
 DARK = 3  # the brightest pixel of a working camera's image is brighter than this, even by night
-
-
-class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
-    """An image tells nothing, or the network makes nothing of it; the driver should brake."""
 
 
 class NetworkPerception:

@@ -12,7 +12,7 @@ from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
 from caldrive.files import write_figure
 from caldrive.perception.evaluation import Done, unwatched
-from caldrive.perception.folders import class_counts, episode_paths
+from caldrive.perception.folders import class_counts, episode_paths, joined
 from caldrive.perception.repaint import FREEDOM
 
 HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
@@ -77,6 +77,6 @@ def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], 
         ax.bar(list(values), list(values.values()), color="#3b6ea5")
         ax.set(title=name.replace("_", " "), yscale="log", ylabel="frames")
     for ax, (name, (bins, unit)) in zip(axes[len(counts) :], HISTOGRAMS.items(), strict=False):
-        ax.hist(np.concatenate([e.columns[name] for e in episodes]), bins, color="#c8782d")
+        ax.hist(joined(episodes, name), bins, color="#c8782d")
         ax.set(title=name.replace("_", " "), yscale="log", xlabel=unit)
     write_figure(path, figure)

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from caldrive.files import write_figure
-from caldrive.perception.dataset import SIZES, Frames, Ids
+from caldrive.perception.dataset import SIZES, Frames
 from caldrive.perception.evaluation import Done, outputs_on, unwatched
 from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import Features
@@ -29,7 +29,7 @@ PAPER = {
     "center_distance/mae_scaled": 0.08465,
 }
 WORST = 4  # frames shown of each affordance
-APART = 30  # frames that lie at least between two of them
+APART = 30  # moments that lie at least between two of them in an episode
 TURNED = (5.0, 10.0)  # degrees; a car looks straight ahead, cameras of a recording up to 15 aside
 
 
@@ -61,14 +61,14 @@ def report(
     network: Network, frames: Frames, features: Features, picture: Path | None = None, progress: Done = unwatched
 ) -> Report:
     """Runs the network over all frames. features: its backbone; picture: where to draw the worst ones (PNG)."""
-    ids, outputs, targets = outputs_on(network, frames, features, progress=progress)
+    outputs, targets = outputs_on(network, frames, features, progress=progress)
     kinds: dict[str, NDArray[Any]] = {
-        "command": np.array([command.value for command in COMMANDS])[frames.command[ids]],
-        "weather": frames.weather[ids].astype(str),
-        "town": frames.town[ids],
-        "place": np.where(frames.junction[ids], "in a junction", "on a street"),
-        "car ahead": _ranges(frames.labels["vehicle_distance"][ids], SIZES["vehicle_distance"], "m", "none"),
-        "camera turned": _ranges(np.degrees(np.abs(frames.camera_yaw[ids])), TURNED, "°", "10 ° and more"),
+        "command": np.array([command.value for command in COMMANDS])[frames.command],
+        "weather": frames.weather.astype(str),
+        "town": frames.town,
+        "place": np.where(frames.junction, "in a junction", "on a street"),
+        "car ahead": _ranges(frames.labels["vehicle_distance"], SIZES["vehicle_distance"], "m", "none"),
+        "camera turned": _ranges(np.degrees(np.abs(frames.camera_yaw)), TURNED, "°", "10 ° and more"),
     }
     groups = {
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}
@@ -80,8 +80,8 @@ def report(
         if spec.discrete
     }
     if picture is not None:
-        draw_worst(frames, ids, outputs, targets, picture)
-    return Report(len(ids), metrics(outputs, targets), groups, confused)
+        draw_worst(frames, outputs, targets, picture)
+    return Report(len(frames), metrics(outputs, targets), groups, confused)
 
 
 def errors(spec: Spec, outputs: Outputs, targets: Targets) -> NDArray[np.float64]:
@@ -92,12 +92,13 @@ def errors(spec: Spec, outputs: Outputs, targets: Targets) -> NDArray[np.float64
     return np.asarray((spec.decode(output) - target * spec.scale).abs().double())
 
 
-def worst(wrong: NDArray[np.float64], ids: Ids) -> list[int]:
-    """Rows of the largest errors, none of them a neighbour of another."""
+def worst(wrong: NDArray[np.float64], frames: Frames) -> list[int]:
+    """The frames with the largest errors (N,), none of them a neighbour of another, seen by whichever camera."""
     chosen: list[int] = []
-    for row in np.argsort(-wrong, kind="stable").tolist():
-        if all(abs(int(ids[row]) - int(ids[one])) > APART for one in chosen):
-            chosen.append(row)
+    for i in np.argsort(-wrong, kind="stable").tolist():
+        near = (frames.episode[chosen] == frames.episode[i]) & (abs(frames.moment[chosen] - frames.moment[i]) <= APART)
+        if not near.any():
+            chosen.append(i)
         if len(chosen) == WORST:
             break
     return chosen
@@ -112,7 +113,7 @@ def _said(spec: Spec, outputs: Outputs, targets: Targets, row: int) -> str:
     return f"{spec.name.replace('_', ' ')}: {value:.2f}, really {wanted:.2f} {spec.unit}"
 
 
-def draw_worst(frames: Frames, ids: Ids, outputs: Outputs, targets: Targets, path: Path) -> None:
+def draw_worst(frames: Frames, outputs: Outputs, targets: Targets, path: Path) -> None:
     """A page (PNG) with the worst frames of each affordance, what was seen and what was true."""
     from matplotlib.figure import Figure
 
@@ -121,8 +122,8 @@ def draw_worst(frames: Frames, ids: Ids, outputs: Outputs, targets: Targets, pat
     for line, spec in zip(axes, SPECS, strict=True):
         for ax in line:
             ax.set_axis_off()
-        for ax, row in zip(line, worst(errors(spec, outputs, targets), ids), strict=False):
-            episode, at = frames.source(int(ids[row]))
-            ax.imshow(episode.image(at))
-            ax.set_title(f"{_said(spec, outputs, targets, row)}\n{episode.id}, row {at}", fontsize=8)
+        for ax, i in zip(line, worst(errors(spec, outputs, targets), frames), strict=False):
+            episode, row = frames.source(i)
+            ax.imshow(episode.image(row))
+            ax.set_title(f"{_said(spec, outputs, targets, i)}\n{episode.id}, row {row}", fontsize=8)
     write_figure(path, figure)

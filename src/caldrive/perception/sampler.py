@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -57,16 +56,8 @@ class Sampler:
         }
 
 
-def every_window(frames: Frames, window: int, batch: int) -> Iterator[Ids]:
-    """First frames of windows that cover every stream evenly, without overlap, in batches; a rest shorter than one is
-    left out."""
-    starts = frames.starts(window)
-    aligned = starts[(starts - frames.stream_start[starts]) % window == 0]
-    yield from (aligned[i : i + batch] for i in range(0, len(aligned), batch))
-
-
 def summary(train: Frames, held: Frames) -> dict[str, Any]:
-    """What a checkpoint remembers of its data. validation_episodes: keys of those that it never learnt from."""
+    """What a checkpoint remembers of its data. validation_episodes: keys of those kept for validation."""
     counts = {s.name: np.bincount(train.targets[s.name], minlength=s.outputs).tolist() for s in SPECS if s.discrete}
     return {
         "train_frames": len(train),

@@ -85,11 +85,6 @@ def encode_columns(labels: Mapping[str, NDArray[Any]]) -> dict[str, Tensor]:
     return {spec.name: spec.encode(labels[spec.name]) for spec in SPECS}
 
 
-def encode(affordances: Affordances) -> dict[str, Tensor]:
-    """One frame's labels as targets with N = 1."""
-    return encode_columns({spec.name: np.array([getattr(affordances, spec.name) or 0.0]) for spec in SPECS})
-
-
 def decode(outputs: Outputs) -> Affordances:
     """Outputs with N = 1 as affordances: probabilities by softmax, the likeliest sign, values in SI units."""
     values: dict[str, Any] = {}

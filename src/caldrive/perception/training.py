@@ -8,16 +8,15 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import torch
-from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
+from caldrive.interfaces import Progress, silent
 from caldrive.perception.blocks import feature_table, forget_features, learn_blocks
-from caldrive.perception.calibration import calibrated, input_ranges
+from caldrive.perception.calibration import calibrated, input_ranges, uncalibrated
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
 from caldrive.perception.curves import Board, draw_curves
 from caldrive.perception.dataset import Frames
@@ -63,7 +62,7 @@ def _initial(path: str, perception: PerceptionConfig) -> Network:
     wanted = {spec.name: getattr(perception, spec.name) for spec in SPECS}
     if replace(info.config, **wanted) != perception:
         raise CheckpointError(f"{path} is a network of another width or image size than wanted: give its --preset")
-    network = Network(perception)
+    network, found = Network(perception), uncalibrated(found, info.data.get("train_classes", {}))
     network.backbone.load_state_dict(found.backbone.state_dict())
     for name in wanted.keys() - set(anew(info.config, perception)):
         network.blocks[name].load_state_dict(found.blocks[name].state_dict())
@@ -98,13 +97,14 @@ def validate(run: TrainingRun, held: Frames, model: Path, context: int) -> Row:
     context: frames of history that it sees.
     """
     sampler, config = run.sampler, run.config
-    network = calibrated(run.network, sampler.frames, sampler.class_counts(), run.weights).eval()
+    data = summary(sampler.frames, held)
+    network = calibrated(run.network, data["train_classes"]).eval()
     round_to_half(network)
     found = evaluate(network, held, config.precision, run.team.device, context)
     seen = normalise(to_float(sampler.frames.images(sampler.draw(0, RANGED))))
     ranges = input_ranges(network.backbone, seen.to(run.team.device))
     told = asdict(config) | {"initial": config.initial and Path(config.initial).name}  # not whose folder
-    info = CheckpointInfo(network.config, summary(sampler.frames, held), found, told, config.seed, ranges)
+    info = CheckpointInfo(network.config, data, found, told, config.seed, ranges)
     save_network(model, network, info, half=True)
     return {f"validation/{name}": value for name, value in found.items()}
 
@@ -115,7 +115,7 @@ def train(
     out: Path | str,
     perception: PerceptionConfig | None = None,
     imagenet: Path | None = None,
-    progress: bool = True,
+    progress: Progress = silent,
     stop: Callable[[int], bool] = lambda step: False,
 ) -> Path:
     """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
@@ -129,27 +129,30 @@ def train(
     """
     out, perception = Path(out), perception or PerceptionConfig()
     team = join(config.device, config.batch)
+    progress = progress if team.leads else silent
     size = (perception.image_height, perception.image_width)
     train_episodes, held_episodes = split(
         find_episodes(data, semantic=config.augment or config.segmentation > 0), config.validation_share, config.seed
     )
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
-    known = (out / STATE).is_file()  # then what the run began with is needed no more
+    known = begun(out)  # then what the run began with is needed no more
     run = start(config, perception, frames, None if known else imagenet, team, None if known else config.initial)
     if known:
         run.restore(out / STATE)
     team.wait()
     rows, board = kept_rows(out / METRICS, run.step), Board(out / "tensorboard", team.leads)
-    columns: tuple[Any, ...] = (MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
-    with Progress(*columns, disable=not (progress and team.leads)) as bar:
-        task = bar.add_task("training", total=config.steps, completed=run.step, note="")
-        while run.step < config.steps and not stop(run.step):
-            rows.append(_step(run, held, out, rows))
-            board.add(rows[-1])
-            bar.update(task, completed=run.step, note=f"loss {rows[-1]['loss']:.3f}")
-        if run.step == config.steps and _looks_back(run) and team.leads and not stop(run.step):
-            _finish(run, held, out, rows, board, bar)
+    while run.step < config.steps and not stop(run.step):
+        rows.append(_step(run, held, out, rows))
+        board.add(rows[-1])
+        progress(f"training, step {run.step}, loss {rows[-1]['loss']:.3f}", run.step / config.steps)
+    if run.step == config.steps and _looks_back(run) and team.leads and not stop(run.step):
+        _finish(run, held, out, rows, board, progress)
     return out / MODEL
+
+
+def begun(out: Path) -> bool:
+    """Whether a run lies in this folder that can be taken up."""
+    return (out / STATE).is_file()
 
 
 def _looks_back(run: TrainingRun) -> bool:
@@ -157,20 +160,18 @@ def _looks_back(run: TrainingRun) -> bool:
     return run.config.block_steps > 0 and run.network.span > 1
 
 
-def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: Board, bar: Progress) -> None:
+def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: Board, progress: Progress) -> None:
     """The blocks that look back learn alone, unless they did already."""
     last = run.config.steps + run.config.block_steps
     if any(row["step"] == last for row in kept_rows(out / METRICS, last)):
         forget_features(out)
         return
-    task = bar.add_task("features", total=len(run.sampler.frames), note="features")
     info = load_network(out / MODEL)[1]
-    features = feature_table(run, info, out, lambda n: bar.update(task, completed=n))
-    task = bar.add_task("blocks", total=run.config.block_steps, note="")
+    features = feature_table(run, info, out, lambda n: progress("features", n / len(run.sampler.frames)))
     for step, loss in enumerate(learn_blocks(run, features), start=1):
         rows.append({"step": run.config.steps + step, "loss": _number(loss, run.config.steps + step)})
         board.add(rows[-1])
-        bar.update(task, completed=step, note=f"blocks' loss {loss:.3f}")
+        progress(f"blocks, step {step}, loss {loss:.3f}", step / run.config.block_steps)
     run.network.to(run.team.device)
     rows[-1] |= validate(run, held, out / MODEL, run.network.span - 1)
     board.add(rows[-1])
