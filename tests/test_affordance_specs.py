@@ -74,13 +74,16 @@ def test_the_loss_adds_all_six_in_scaled_units() -> None:
     assert float(loss(outputs, targets)) == pytest.approx(0.75, abs=1e-6)
 
 
-@pytest.mark.parametrize(("name", "limit"), [("vehicle_distance", 50.0), ("center_distance", 2.0)])
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [("vehicle_distance", 50.0), ("center_distance", 2.0), ("center_distance", -2.0), ("relative_angle", -math.pi)],
+)
 def test_an_output_beyond_a_limit_is_right_where_the_truth_is_at_it(name: str, limit: float) -> None:
     at_limit, within = encode(Affordances(**{name: limit})), encode(Affordances(**{name: limit / 2}))
     for targets, wrong_by in ((at_limit, 0.0), (within, 0.3)):
-        beyond = losses({name: perfect_outputs(targets)[name] + 0.3}, targets)[name]
+        beyond = losses({name: perfect_outputs(targets)[name] + math.copysign(0.3, limit)}, targets)[name]
         assert float(beyond) == pytest.approx(wrong_by, abs=1e-6)
-    short = losses({name: perfect_outputs(at_limit)[name] - 0.3}, at_limit)[name]
+    short = losses({name: perfect_outputs(at_limit)[name] - math.copysign(0.3, limit)}, at_limit)[name]
     assert float(short) == pytest.approx(0.3, abs=1e-6)
 
 

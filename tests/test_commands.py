@@ -225,3 +225,30 @@ def test_what_is_collected_can_be_trained_on_and_the_result_drives(
     assert (checked["episodes"], checked["damaged"]) == (2, [])
     driven = run_json(*DRIVE, "--model", model, "--seconds", "1", "--no-video", "--out", str(tmp_path / "drive"))
     assert driven["episodes"][0]["duration"] == pytest.approx(1.0)
+
+
+def test_a_training_says_which_blocks_begin_anew(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from caldrive.commands.learning import Train
+    from caldrive.perception.checkpoint import CheckpointInfo, save_network
+    from caldrive.perception.network import Network
+
+    usual = PerceptionConfig()
+    other = replace(usual, hazard_stop=replace(usual.hazard_stop, dilation=5))
+    save_network(tmp_path / "other.safetensors", Network(other), CheckpointInfo(other))
+    assert Train(initial=tmp_path / "other.safetensors")._began_anew() == ["hazard_stop"]
+    assert Train(initial=tmp_path / "gone.safetensors")._began_anew() == []
+
+
+def test_imagenets_weights_are_asked_for_by_a_training_that_begins_and_not_by_one_that_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TORCH_HOME", str(tmp_path / "hub"))
+    train = ["train", "--preset", "paper", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "out")]
+    assert main(train) == 2
+    assert "found no vgg16-*.pth" in capsys.readouterr().err
+    (tmp_path / "out").mkdir(exist_ok=True)
+    (tmp_path / "out" / "state.safetensors").touch()
+    assert main(train) == 2
+    assert "there is no episode" in capsys.readouterr().err

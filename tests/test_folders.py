@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from caldrive.episodes import EpisodeError
-from caldrive.perception.folders import find_episodes, split
-from tests.perception_data import HEIGHT, WIDTH
+from caldrive.episodes import EpisodeError, EpisodeWriter
+from caldrive.perception.folders import class_counts, find_episodes, held_out, split
+from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
 
 SIZE = (HEIGHT, WIDTH)
 
@@ -24,3 +25,24 @@ def test_one_episode_is_too_few(folder: Path, tmp_path: Path) -> None:
         split(find_episodes(folder)[:1], 0.05, seed=0)
     with pytest.raises(EpisodeError, match="there is no episode"):
         find_episodes(tmp_path)
+
+
+def test_what_a_training_kept_for_validation_is_found_again_or_missed(folder: Path) -> None:
+    episodes = find_episodes(folder)
+    kept = [e.key for e in episodes[:2]]
+    assert held_out(episodes, {"validation_episodes": kept}) == episodes[:2]
+    for data in ({}, {"validation_episodes": [*kept, "town01-other"]}):
+        with pytest.raises(EpisodeError, match=f"found {2 * len(data)} of the {3 * len(data)} episodes"):
+            held_out(episodes, data)
+
+
+def test_classes_turns_and_the_causes_of_hazards_are_counted(tmp_path: Path) -> None:
+    with EpisodeWriter(tmp_path / "one.parquet", SCENARIO) as writer:
+        for index, distance in enumerate((3.0, 5.0, 50.0, 50.0, 4.0, 50.0, 50.0, 50.0)):
+            frame = make_frame(index, hazard=index < 4)
+            writer.append(replace(frame, affordances=replace(frame.affordances, vehicle_distance=distance)))
+    counts = class_counts(find_episodes(tmp_path))
+    assert counts["hazard_stop"] == {"0": 4, "1": 4}
+    assert counts["hazard_by"] == {"car ahead": 2, "person or car across": 2}
+    assert counts["command"] == {"left": 4, "straight": 4}
+    assert counts["turn"] == {"straight": 1}  # of the tiny frames each eighth lies in a junction

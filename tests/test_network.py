@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,5 +126,16 @@ def test_foreign_imagenet_weights_are_refused(tmp_path: Path) -> None:
     save_file({"features.0.weight": torch.zeros(8, 3, 3, 3)}, path)
     with pytest.raises(ValueError, match=r"features\.0\.weight of shape \(8, 3, 3, 3\)"):
         Backbone(1.0).load_imagenet(path)
-    with pytest.raises(ValueError, match="set width to 1"):
+    with pytest.raises(ValueError, match="type --preset paper"):
         Network(replace(TINY, width=0.25)).backbone.load_imagenet(path)
+
+
+def test_imagenet_weights_are_read_as_torch_hub_keeps_them_and_nothing_else_is_unpickled(tmp_path: Path) -> None:
+    path, backbone = tmp_path / "vgg16-397923af.pth", Backbone(1.0)
+    torch.save(vgg16_state(), path)
+    backbone.load_imagenet(path)
+    assert float(backbone.convolutions()[1].weight.detach()[0, 0, 0, 0]) == 2.5
+    for content in (b"", b"no pickle", pickle.dumps(print, protocol=2)):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match="no state dict of tensors"):
+            backbone.load_imagenet(path)

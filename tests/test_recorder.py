@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from caldrive.config import CameraConfig, CollectConfig
-from caldrive.driving.distracted import Tailgater
+from caldrive.driving.agent import OraclePerception
+from caldrive.driving.distracted import HiddenCars, Tailgater
 from caldrive.driving.recorder import BASELINES, _set_up, episode_path, record_episode
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
@@ -140,3 +141,16 @@ def test_other_houses_stand_along_the_same_streets(world: EmbeddedWorld, tmp_pat
     assert a.scenario == b.scenario
     assert (a.columns["relative_angle"] == b.columns["relative_angle"]).all()
     assert np.abs(a.image(0).astype(int) - b.image(0)).mean() > 3
+
+
+def test_in_some_episodes_the_driver_is_not_told_of_cars(world: EmbeddedWorld) -> None:
+    for share, kind in ((1.0, HiddenCars), (0.0, OraclePerception)):
+        config = replace(TINY, hidden_cars=share)
+        assert type(_set_up(world, config, 0, False, np.random.default_rng(1))[1].perception) is kind
+
+
+def test_the_disturbed_command_and_the_clean_one_are_both_recorded(world: EmbeddedWorld, tmp_path: Path) -> None:
+    moving = replace(TINY, duration=9.0, cars=0, people=0)
+    frames = list(recording(world, moving, tmp_path, number=1))
+    apart = [frame.driven != frame.clean for frame in frames if frame.camera == 0]
+    assert 0.02 < np.mean(apart) < 0.6

@@ -2,9 +2,12 @@ from __future__ import annotations
 
 import json
 import platform
+import time
 from dataclasses import replace
 from importlib.util import find_spec
+from multiprocessing import get_context
 from pathlib import Path
+from signal import SIGKILL
 
 import pytest
 import torch
@@ -217,3 +220,26 @@ def test_memory_is_kept_where_the_system_can() -> None:
     if name == "glibc" and tuple(map(int, version.split("."))) < (2, 35):
         pytest.skip("glibc's malloc kept blocks of 32 MiB at most before 2.35")
     assert keep_memory() is (name == "glibc")
+
+
+def _train_slowly(data: Path, out: Path) -> None:
+    torch.set_num_threads(1)
+
+    def slow(step: int) -> bool:
+        time.sleep(0.2 if step > 2 else 0.0)
+        return False
+
+    train(SHORT, data, out, TINY, stop=slow)
+
+
+def test_a_training_killed_at_any_moment_resumes_to_the_same_weights(folder: Path, tmp_path: Path) -> None:
+    whole, killed = train(SHORT, folder, tmp_path / "whole", TINY), tmp_path / "killed"
+    process = get_context("spawn").Process(target=_train_slowly, args=(folder, killed))
+    process.start()
+    while not (killed / "state.safetensors").is_file() and process.is_alive():
+        time.sleep(0.02)
+    process.kill()
+    process.join()
+    assert process.exitcode == -SIGKILL
+    assert not (killed / "model.safetensors").exists()
+    assert train(SHORT, folder, killed, TINY).read_bytes() == whole.read_bytes()

@@ -16,7 +16,7 @@ from typing import Any
 import tyro
 
 from caldrive.commands import Answer, Command
-from caldrive.interfaces import Progress, silent
+from caldrive.progress import Progress, silent
 
 DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None

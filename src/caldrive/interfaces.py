@@ -1,8 +1,7 @@
-"""The seams of caldrive: a world to drive in, a perception that looks, an agent that acts, and who watches."""
+"""The three seams of caldrive: a world to drive in, a perception that looks, an agent that acts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 from caldrive.datatypes import Affordances, Control, Decision, Observation, Scenario, Truth
@@ -37,10 +36,3 @@ class Agent(Protocol):
 
     def reset(self) -> None: ...
     def act(self, observation: Observation) -> Control: ...
-
-
-Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
-
-
-def silent(label: str, share: float) -> None:
-    """Progress that nobody follows."""

@@ -10,7 +10,7 @@ import tyro
 
 from caldrive.commands.answer import Answer, Output
 from caldrive.driving.settings import BenchmarkSettings
-from caldrive.interfaces import Progress
+from caldrive.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from caldrive.commands.answer import Answer, Output
 from caldrive.driving.settings import DeterminismSettings, DriveSettings
-from caldrive.interfaces import Progress
+from caldrive.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import tyro
 from caldrive.commands.answer import Answer, Output
 from caldrive.config import PERCEPTIONS, TRAININGS, CollectConfig, TrainingConfig
 from caldrive.driving.settings import CollectSettings, DataSettings, EvaluateSettings, TrainSettings
-from caldrive.interfaces import Progress
+from caldrive.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 from caldrive.commands.answer import Answer, Output
 from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
-from caldrive.interfaces import Progress
+from caldrive.progress import Progress
 
 
 @dataclass(frozen=True)

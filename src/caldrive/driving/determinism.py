@@ -12,7 +12,7 @@ from typing import Any
 
 from caldrive.datatypes import Step
 from caldrive.driving.settings import DeterminismSettings
-from caldrive.interfaces import Progress, silent
+from caldrive.progress import Progress, silent
 
 PARTS = ("image", "truth", "decision", "control")
 

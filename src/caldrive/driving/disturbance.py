@@ -16,22 +16,22 @@ class Disturbance:
     that stays as it is, which lets the car turn in too late or keep turning for too long."""
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self.rng, self.left, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
+        self.rng, self.remaining, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
 
     def apply(self, control: Control, speed: float) -> Control:
         """The disturbed control. The faster the car, the weaker the push: its sideways acceleration is what counts."""
-        if self.left == 0:
+        if self.remaining == 0:
             if speed > 2.0 and self.rng.random() < 0.035:
                 self._begin(control, speed)
             return control
-        share = 1 - abs(2 * self.left / self.length - 1)
-        self.left -= 1
+        share = 1 - abs(2 * self.remaining / self.length - 1)
+        self.remaining -= 1
         effort = control.throttle - control.brake + share * self.pedal * (control.brake < 0.3)
         steer = control.steer + share * self.push if self.push else self.wheel
         return Control(*(float(np.clip(x, low, 1)) for x, low in ((effort, 0), (-effort, 0), (steer, -1))))
 
     def _begin(self, control: Control, speed: float) -> None:
-        self.left = self.length = int(self.rng.integers(6, 19))
+        self.remaining = self.length = int(self.rng.integers(6, 19))
         self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
         self.wheel, self.push = control.steer, 0.0
         if self.rng.random() < 0.6:
@@ -47,7 +47,7 @@ class LateStart:
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self.rng, self.left, self.asked, self.braked = rng, 0, False, False
+        self.rng, self.remaining, self.asked, self.braked = rng, 0, False, False
 
     def apply(self, control: Control, speed: float) -> Control:
         """The control, or braking on."""
@@ -55,15 +55,15 @@ class LateStart:
             self.asked = False
         elif speed < 0.1 and control.throttle > 0 and not self.asked:
             self.asked = True
-            if self.left == 0:  # who braked on until he stands has dreamt already
+            if self.remaining == 0:  # who braked on until he stands has dreamt already
                 self._dream()
-        if self.braked and control.brake == 0 and speed > 0.5 and self.left == 0:
+        if self.braked and control.brake == 0 and speed > 0.5 and self.remaining == 0:
             self._dream()
         self.braked = control.brake >= HARD
-        if self.left == 0:
+        if self.remaining == 0:
             return control
-        self.left -= 1
+        self.remaining -= 1
         return Control(brake=1.0, steer=control.steer)
 
     def _dream(self) -> None:
-        self.left = int(self.rng.integers(5, 21)) if self.rng.random() < 0.5 else 0
+        self.remaining = int(self.rng.integers(5, 21)) if self.rng.random() < 0.5 else 0

@@ -19,7 +19,7 @@ from caldrive.driving.settings import DriveSettings
 from caldrive.driving.trace import Trace, episode_json, result_values
 from caldrive.driving.video import VideoWriter
 from caldrive.files import write_whole
-from caldrive.interfaces import Progress, silent
+from caldrive.progress import Progress, silent
 from caldrive.results import EpisodeResult, Outcome
 
 

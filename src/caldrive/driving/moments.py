@@ -11,7 +11,8 @@ PATIENCE, SEARCH = 2, 6  # times the wanted duration that a drive may last; of a
 BEGINNING = 6  # a tailgater's first moments tell, one in so many of those wanted, and later it takes a car
 MEETING = 25.0  # m; a car ahead that is nearer
 STANDING = 0.1  # m/s
-STOOD, RUN = 15, 9  # moments that tell when the car comes to stand; then a run of these in so many times STOOD
+STOOD = 15  # moments that tell when the car comes to stand,
+RUN, EVERY = 9, 135  # and then a run of so many in so many: single ones would have no history
 
 
 def moments(world: EmbeddedWorld, duration: float, tailgating: bool) -> Iterator[tuple[int, Observation, bool]]:
@@ -28,7 +29,7 @@ def moments(world: EmbeddedWorld, duration: float, tailgating: bool) -> Iterator
         reasons = labels.hazard_stop, labels.red_light
         stood = stood + 1 if world.observation.speed < STANDING and reasons == before else 0
         before = reasons
-        telling = stood <= STOOD or stood % (STOOD * RUN) < RUN  # in runs, which have a history
+        telling = stood <= STOOD or stood % EVERY < RUN
         telling = telling and (not tailgating or index < beginning or labels.vehicle_distance < MEETING)
         told += telling
         yield index, world.observation, telling

@@ -20,7 +20,7 @@ from caldrive.driving.settings import DriverSettings
 from caldrive.driving.suites import Trial, suite
 from caldrive.driving.trace import result_values
 from caldrive.driving.video import VideoWriter
-from caldrive.interfaces import Progress, silent
+from caldrive.progress import Progress, silent
 from caldrive.results import EpisodeResult
 
 

@@ -20,7 +20,7 @@ from caldrive.config import KMH, CameraConfig, ControlConfig
 from caldrive.datatypes import Command, Observation, Scenario
 from caldrive.driving.limits import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
-from caldrive.interfaces import Progress, silent
+from caldrive.progress import Progress, silent
 
 PACE = 30.0  # km/h that the car under measurement drives at most
 WARM_UP, MOST_STEPS = 20, 100_000  # steps that do not count, and those that one may ask for

@@ -10,7 +10,7 @@ from caldrive.datatypes import Command, Pose, Sign
 from caldrive.world.redecoration import one_of
 from caldrive.world.roads import Lane, RoadNetwork
 
-BEFORE_SIGN, BEFORE_TURN = (15.0, 45.0), (2.0, 25.0)  # m
+AHEAD_OF_SIGN, AHEAD_OF_TURN = (15.0, 45.0), (2.0, 25.0)  # m
 
 
 def starting_place(
@@ -24,13 +24,13 @@ def starting_place(
         limit = one_of(limits, rng)
         sign = one_of([sign for sign in signs if sign.limit == limit], rng)
         lane, at = roads.lane_at(sign.pose)
-        return _upstream(roads, lane, at - float(rng.uniform(*BEFORE_SIGN))), None
+        return _upstream(roads, lane, at - float(rng.uniform(*AHEAD_OF_SIGN))), None
     turns = [lane for lane in roads.lanes.values() if lane.turn is not None]
     commands = [command for command in Command if any(lane.turn is command for lane in turns)]
     if commands and before_signs <= chance < before_signs + before_turns:
         command = one_of(commands, rng)
         turn = one_of([lane for lane in turns if lane.turn is command], rng)
-        return _upstream(roads, turn, -float(rng.uniform(*BEFORE_TURN))), turn.id
+        return _upstream(roads, turn, -float(rng.uniform(*AHEAD_OF_TURN))), turn.id
     lane = one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
     return lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3))), None
 

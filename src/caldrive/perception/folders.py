@@ -13,6 +13,8 @@ from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
 from caldrive.perception.specs import SPECS
 
+NEAR = 6.0  # m; a car ahead that is a hazard is nearer
+
 
 def episode_paths(folder: Path | str) -> list[Path]:
     """The files of a folder's episodes by name. Raises EpisodeError where there is none."""
@@ -36,10 +38,15 @@ def joined(episodes: Sequence[Episode], name: str) -> NDArray[Any]:
 
 
 def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
-    """How many frames of a recording have each value of the discrete affordances and of the command."""
+    """How many frames of a recording have each value of the discrete affordances and of the command, turn each way in a
+    junction, and have to stop for a person or a car across and not for the car ahead."""
+    columns = {name: joined(episodes, name) for name in (*(s.name for s in SPECS if s.discrete), "command")}
+    columns["turn"] = columns["command"][joined(episodes, "junction")]
+    near = joined(episodes, "vehicle_distance")[columns["hazard_stop"] > 0] < NEAR
+    columns["hazard_by"] = np.where(near, "car ahead", "person or car across")
     found = {}
-    for name in (*(s.name for s in SPECS if s.discrete), "command"):
-        values, counts = np.unique(joined(episodes, name), return_counts=True)
+    for name, column in columns.items():
+        values, counts = np.unique(column, return_counts=True)
         found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
     return found
 

@@ -71,10 +71,10 @@ def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], 
     """A picture (PNG) of how often each value of each label occurs."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13, 6), layout="constrained")
-    axes = figure.subplots(2, 4).ravel()
+    figure = Figure(figsize=(16, 6), layout="constrained")
+    axes = figure.subplots(2, 5).ravel()
     for ax, (name, values) in zip(axes, counts.items(), strict=False):
-        ax.bar(list(values), list(values.values()), color="#3b6ea5")
+        ax.bar([one.replace(" or ", " or\n") for one in values], list(values.values()), color="#3b6ea5")
         ax.set(title=name.replace("_", " "), yscale="log", ylabel="frames")
     for ax, (name, (bins, unit)) in zip(axes[len(counts) :], HISTOGRAMS.items(), strict=False):
         ax.hist(joined(episodes, name), bins, color="#c8782d")

@@ -44,6 +44,8 @@ def join(device: str, batch: int) -> Team:
         return Team(kind)
     if batch % size:
         raise ValueError(f"found {size} processes for a batch of {batch}, wanted equal shares: start another number")
+    if kind == "cuda":  # NCCL works on the process' current device
+        torch.cuda.set_device(local)
     if not distributed.is_initialized():
         distributed.init_process_group("nccl" if kind == "cuda" else "gloo")
     return Team(f"cuda:{local}" if kind == "cuda" else kind, rank, size)

@@ -14,7 +14,6 @@ from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
-from caldrive.interfaces import Progress, silent
 from caldrive.perception.blocks import feature_table, forget_features, learn_blocks
 from caldrive.perception.calibration import calibrated, input_ranges, uncalibrated
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
@@ -29,6 +28,7 @@ from caldrive.perception.sampler import Sampler, summary
 from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.specs import SPECS, class_weights
 from caldrive.perception.team import Team, join
+from caldrive.progress import Progress, silent
 from caldrive.typed import read_json
 
 Row = dict[str, int | float]
