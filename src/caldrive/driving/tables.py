@@ -65,5 +65,6 @@ def counts_table(folder: Path, counts: dict[str, dict[str, int]]) -> Group:
     """How many frames of a recording carry which label."""
     table = Table("label", "frames", box=SIMPLE_HEAD)
     for name, values in counts.items():
-        table.add_row(name.replace("_", " "), ", ".join(f"{value}: {n}" for value, n in values.items()))
+        shown = ", ".join(f"{value}: {n}" for value, n in values.items())
+        table.add_row(name.replace("_", " "), shown or "none")
     return Group(table, Text(f"recorded: {folder}; train on it: caldrive train --data {folder}"))
