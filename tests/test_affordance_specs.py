@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from caldrive.datatypes import Affordances
-from caldrive.perception.specs import SPECS, class_weights, decode, encode_columns, loss, losses, mean_iou, metrics
+from caldrive.perception.specs import SPECS, class_weights, decode, loss, losses, mean_iou, metrics
 
 affordances = st.builds(
     Affordances,
@@ -25,7 +25,7 @@ affordances = st.builds(
 
 def encode(label: Affordances) -> dict[str, Tensor]:
     """One frame's targets."""
-    return encode_columns({spec.name: np.array([getattr(label, spec.name) or 0.0]) for spec in SPECS})
+    return {spec.name: spec.encode(np.array([getattr(label, spec.name) or 0.0])) for spec in SPECS}
 
 
 def perfect_outputs(targets: dict[str, Tensor]) -> dict[str, Tensor]:

@@ -10,6 +10,7 @@ from caldrive.datatypes import Control
 from caldrive.episodes import EpisodeError, EpisodeWriter
 from caldrive.perception.dataset import Frames
 from caldrive.perception.folders import find_episodes
+from caldrive.perception.sampler import rarity
 from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
 
 SIZE = (HEIGHT, WIDTH)
@@ -34,7 +35,7 @@ def test_overlapping_windows_share_their_frames(frames: Frames) -> None:
     assert batch.index.tolist() == [[0, 1, 2, 3, 4, 5, 6], [2, 3, 4, 5, 6, 7, 8]]
     assert batch.group.tolist() == [0] * 7 + [1] * 2
     assert batch.targets["center_distance"].shape == (8,)
-    wanted = frames.labels["center_distance"][[5, 6, 7, 8, 7, 8, 9, 10]] / 1.65
+    wanted = frames.column("center_distance")[[5, 6, 7, 8, 7, 8, 9, 10]] / 1.65
     np.testing.assert_allclose(batch.targets["center_distance"].numpy(), wanted, rtol=1e-5)
 
 
@@ -79,5 +80,5 @@ def test_a_frame_of_a_waiting_car_counts_less_than_one_of_a_car_that_may_go(tmp_
             clean = Control(brake=1.0) if index in (0, 1, 4, 5) else Control(throttle=0.5)
             writer.append(replace(make_frame(index), speed=0.0 if index < 4 else 5.0, clean=clean))
     frames = Frames(find_episodes(tmp_path), SIZE)
-    assert frames.rarity(0.5)[0] == pytest.approx(0.5 * frames.rarity(0.5)[2])  # it stands: for a reason, and without
-    assert frames.rarity(0.5)[4] == frames.rarity(0.5)[6]  # it drives, braking or not
+    assert rarity(frames, 0.5)[0] == pytest.approx(0.5 * rarity(frames, 0.5)[2])  # it stands: for a reason, and without
+    assert rarity(frames, 0.5)[4] == rarity(frames, 0.5)[6]  # it drives, braking or not

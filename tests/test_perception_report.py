@@ -44,7 +44,7 @@ def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_
     assert cars["00 to 03 m"]["vehicle_distance/mae"] == pytest.approx(wrong[0], rel=1e-4)
     assert cars["25 to 50 m"]["vehicle_distance/mae"] == pytest.approx(wrong[5], rel=1e-4)
     places = {name: row["vehicle_distance/mae"] for name, row in found.groups["place"].items()}
-    inside = np.array(frames.junction)
+    inside = np.array(frames.column("junction"))
     assert 0 < inside.sum() < len(inside)
     wanted = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
     assert places == pytest.approx(wanted, rel=1e-4)

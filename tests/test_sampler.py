@@ -11,14 +11,14 @@ SIZE = (HEIGHT, WIDTH)
 
 
 def test_rare_classes_are_drawn_more_often(frames: Frames) -> None:
-    hazard = frames.labels["hazard_stop"]
+    hazard = frames.column("hazard_stop")
     even, keen = (Sampler(frames, 1, balance, seed=0) for balance in (0.0, 1.0))
     assert hazard[even.draw(0, 2000)].mean() == pytest.approx(hazard.mean(), abs=0.04)
     assert hazard[keen.draw(0, 2000)].mean() > 1.5 * hazard.mean()
 
 
 def test_junctions_are_drawn_more_often_than_the_streets_between(frames: Frames) -> None:
-    inside = frames.junction
+    inside = frames.column("junction")
     even, keen = (Sampler(frames, 1, balance, seed=0) for balance in (0.0, 1.0))
     assert inside[even.draw(0, 2000)].mean() == pytest.approx(inside.mean(), abs=0.04)
     assert inside[keen.draw(0, 2000)].mean() > 1.5 * inside.mean()
@@ -29,7 +29,7 @@ def test_class_counts_expect_what_is_drawn(frames: Frames) -> None:
     ids = (sampler.draw(0, 4000)[:, None] + np.arange(3)).ravel()
     expected = sampler.class_counts()["hazard_stop"] / len(frames)
     assert expected.sum() == pytest.approx(1.0)
-    assert frames.labels["hazard_stop"][ids].mean() == pytest.approx(expected[1], abs=0.03)
+    assert frames.column("hazard_stop")[ids].mean() == pytest.approx(expected[1], abs=0.03)
 
 
 def test_draws_depend_on_seed_and_step_only(frames: Frames) -> None:

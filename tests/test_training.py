@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from caldrive.config import TrainingConfig
+from caldrive.perception.beginning import anew
 from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
@@ -23,7 +24,7 @@ from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, learning_rate
 from caldrive.perception.precision import use_bf16
-from caldrive.perception.training import anew, train
+from caldrive.perception.training import train
 from tests.perception_data import HEIGHT, SHORT, TINY, WIDTH, record
 
 

@@ -88,8 +88,8 @@ class Train(TrainSettings, Output):
 
     def _began_anew(self) -> list[str]:
         """The task blocks that --initial does not give; none where a run is taken up that needs its file no more."""
+        from caldrive.perception.beginning import anew
         from caldrive.perception.checkpoint import load_network
-        from caldrive.perception.training import anew
 
         if self.initial is None or not self.initial.is_file():
             return []

@@ -7,32 +7,30 @@ batch lists each frame once and says where the windows find it, so no frame pass
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Command
+from caldrive.datatypes import Command
 from caldrive.episode_reader import Episode
-from caldrive.episodes import LABELS, EpisodeError
+from caldrive.episodes import EpisodeError
 from caldrive.perception.folders import joined
-from caldrive.perception.specs import SPECS, encode_columns
+from caldrive.perception.specs import SPECS
 
 Ids = NDArray[np.int64]
 COMMAND_NUMBERS = {command.value: number for number, command in enumerate(Command)}
-# Edges of the classes in which the size of a continuous column is balanced.
-SIZES = {
-    "vehicle_distance": (3.0, 6.0, 12.0, 25.0, MAX_VEHICLE_DISTANCE),
-    "center_distance": (0.4, 0.8, 1.2),
-    "clean_steer": (0.05, 0.15, 0.4),
-}
 NONE = -1  # number of the command that no frame has
-WAITING = 0.25  # weight of a frame in which the car stands and has to: it looks like the one before
+
+
+def _numbers(commands: NDArray[Any]) -> Ids:
+    """Commands (N,) as the network counts them."""
+    return np.array([COMMAND_NUMBERS.get(command, NONE) for command in commands], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -58,26 +56,13 @@ class Frames:
     """
 
     def __init__(self, episodes: Sequence[Episode], size: tuple[int, int], cache_gb: float = 0.0) -> None:
-        self.size = size
-        self.episodes = tuple((e.key, len(e)) for e in episodes)
-        column = partial(joined, episodes)
-        self.labels = {name: column(name) for name in LABELS}
-        self.command = np.array([COMMAND_NUMBERS[word] for word in column("command")], dtype=np.int64)
-        self.targets = encode_columns(self.labels)
-        self.other_command = np.array(
-            [COMMAND_NUMBERS.get(word, NONE) for word in column("other_command")], dtype=np.int64
-        )
-        self.other_targets = {s.name: s.encode(column(f"other_{s.name}")) for s in SPECS if s.conditional}
-        self._sizes = [np.digitize(np.abs(column(name)), edges) for name, edges in SIZES.items()]
-        self.junction, self.camera_yaw, self.moment = (column(name) for name in ("junction", "camera_yaw", "frame"))
-        # Each command asks for one thing inside a junction, for another before it.
-        self._manoeuvre = 2 * self.command + self.junction
-        self._waiting = (column("speed") < 0.1) & (column("clean_throttle") == 0)
-        lengths = [len(e) for e in episodes]
-        self.episode = np.repeat(np.arange(len(episodes)), lengths)
-        self.stream_start = self._stream_starts(column("camera"))
-        self.weather = np.repeat([e.scenario.weather for e in episodes], lengths)
-        self.town = np.repeat([e.scenario.town for e in episodes], lengths)
+        self.size, self.episodes = size, tuple(episodes)
+        self.targets = {spec.name: spec.encode(self.column(spec.name)) for spec in SPECS}
+        self.command = _numbers(self.column("command"))
+        self.other_command = _numbers(self.column("other_command"))
+        self.other_targets = {s.name: s.encode(self.column(f"other_{s.name}")) for s in SPECS if s.conditional}
+        self.episode, self.moment = self.by_episode(range(len(episodes))), self.column("frame")
+        self.stream_start = self._stream_starts()
         self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
         self.has_semantics = all(e.semantics is not None for e in episodes)
         self._pool = ThreadPoolExecutor(2)
@@ -91,13 +76,22 @@ class Frames:
     @property
     def digest(self) -> str:
         """Tells these episodes and their labels from others."""
-        found = hashlib.sha256(repr(self.episodes).encode())
+        found = hashlib.sha256(repr([(e.key, len(e)) for e in self.episodes]).encode())
         for values in (self.command, self.other_command, *self.targets.values(), *self.other_targets.values()):
             found.update(np.asarray(values).tobytes())
         return found.hexdigest()[:16]
 
-    def _stream_starts(self, camera: Ids) -> Ids:
+    def column(self, name: str) -> NDArray[Any]:
+        """A column (N,) of the recording."""
+        return joined(self.episodes, name)
+
+    def by_episode(self, values: Iterable[Any]) -> NDArray[Any]:
+        """For each frame (N,) what its episode has of these, one for each episode."""
+        return np.repeat(list(values), [len(e) for e in self.episodes])
+
+    def _stream_starts(self) -> Ids:
         """For each frame the number of its stream's first one."""
+        camera = self.column("camera")
         follows = (np.diff(self.episode) == 0) & (np.diff(camera) == 0) & (np.diff(self.moment) == 1)
         first = np.concatenate(([True], ~follows))
         return np.maximum.accumulate(np.where(first, np.arange(len(first)), 0))
@@ -169,11 +163,3 @@ class Frames:
         inside = last < len(self)
         inside[inside] &= self.stream_start[last[inside]] == self.stream_start[: len(self)][inside]
         return np.flatnonzero(inside)
-
-    def rarity(self, balance: float) -> NDArray[np.float64]:
-        """For each frame (N,): (1 / frequency) ** balance of its rarest class; of classes are the discrete affordances,
-        the command inside a junction and elsewhere, and the sizes of what is continuous."""
-        numbers = [self.targets[s.name].numpy() for s in SPECS if s.discrete] + [self._manoeuvre, *self._sizes]
-        frequencies = [(np.bincount(number) / len(self))[number] for number in numbers]
-        rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
-        return (1 / rarest) ** balance * np.where(self._waiting, WAITING**balance, 1.0)

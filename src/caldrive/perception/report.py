@@ -13,10 +13,11 @@ import torch
 from numpy.typing import NDArray
 
 from caldrive.files import write_figure
-from caldrive.perception.dataset import SIZES, Frames
+from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import Done, outputs_on, unwatched
 from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import Features
+from caldrive.perception.sampler import SIZES
 from caldrive.perception.specs import SPECS, Outputs, Spec, Targets, confusion, metrics
 
 # Supplement, comparison of temporal and non-temporal task blocks: the better of the two.
@@ -64,11 +65,11 @@ def report(
     outputs, targets = outputs_on(network, frames, features, progress=progress)
     kinds: dict[str, NDArray[Any]] = {
         "command": np.array([command.value for command in COMMANDS])[frames.command],
-        "weather": frames.weather.astype(str),
-        "town": frames.town,
-        "place": np.where(frames.junction, "in a junction", "on a street"),
-        "car ahead": _ranges(frames.labels["vehicle_distance"], SIZES["vehicle_distance"], "m", "none"),
-        "camera turned": _ranges(np.degrees(np.abs(frames.camera_yaw)), TURNED, "°", "10 ° and more"),
+        "weather": frames.by_episode(str(e.scenario.weather) for e in frames.episodes),
+        "town": frames.by_episode(e.scenario.town for e in frames.episodes),
+        "place": np.where(frames.column("junction"), "in a junction", "on a street"),
+        "car ahead": _ranges(frames.column("vehicle_distance"), SIZES["vehicle_distance"], "m", "none"),
+        "camera turned": _ranges(np.degrees(np.abs(frames.column("camera_yaw"))), TURNED, "°", "10 ° and more"),
     }
     groups = {
         kind: {str(v): metrics(_part(outputs, of == v), _part(targets, of == v)) for v in np.unique(of)}

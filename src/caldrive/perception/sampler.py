@@ -7,11 +7,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE
 from caldrive.episodes import EpisodeError
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.specs import SPECS
 
+# Edges of the classes in which the size of a continuous column is balanced.
+SIZES = {
+    "vehicle_distance": (3.0, 6.0, 12.0, 25.0, MAX_VEHICLE_DISTANCE),
+    "center_distance": (0.4, 0.8, 1.2),
+    "clean_steer": (0.05, 0.15, 0.4),
+}
+WAITING = 0.25  # weight of a frame in which the car stands and has to: it looks like the one before
 OTHERS = 0.5  # share of the windows that are seen with another command, if one could be given
+
+
+def rarity(frames: Frames, balance: float) -> NDArray[np.float64]:
+    """For each frame (N,): (1 / frequency) ** balance of its rarest class; of classes are the discrete affordances, the
+    command inside a junction and elsewhere, and the sizes of what is continuous."""
+    numbers = [frames.targets[s.name].numpy() for s in SPECS if s.discrete]
+    numbers += [np.digitize(np.abs(frames.column(name)), edges) for name, edges in SIZES.items()]
+    # Each command asks for one thing inside a junction, for another before it.
+    numbers.append(2 * frames.command + frames.column("junction"))
+    frequencies = [(np.bincount(number) / len(frames))[number] for number in numbers]
+    waiting = (frames.column("speed") < 0.1) & (frames.column("clean_throttle") == 0)
+    rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
+    return (1 / rarest) ** balance * np.where(waiting, WAITING**balance, 1.0)
 
 
 class Sampler:
@@ -28,8 +49,8 @@ class Sampler:
             raise EpisodeError(
                 f"no stream of frames is {window} long: record longer episodes or make the window shorter"
             )
-        rarity = frames.rarity(balance)
-        weight = np.max([rarity[self.starts + i] for i in range(window)], axis=0)
+        rare = rarity(frames, balance)
+        weight = np.max([rare[self.starts + i] for i in range(window)], axis=0)
         self.probability = weight / weight.sum()
         self._cumulative = np.cumsum(self.probability)
 
@@ -63,5 +84,5 @@ def summary(train: Frames, held: Frames) -> dict[str, Any]:
         "train_frames": len(train),
         "validation_frames": len(held),
         "train_classes": counts,
-        "validation_episodes": sorted({held.source(i)[0].key for i in range(len(held))}),
+        "validation_episodes": sorted({episode.key for episode in held.episodes}),
     }

@@ -80,11 +80,6 @@ def describe() -> list[dict[str, Any]]:
     return [asdict(spec) | {"classes": list(spec.classes)} for spec in SPECS]
 
 
-def encode_columns(labels: Mapping[str, NDArray[Any]]) -> dict[str, Tensor]:
-    """Label columns (N,) as targets."""
-    return {spec.name: spec.encode(labels[spec.name]) for spec in SPECS}
-
-
 def decode(outputs: Outputs) -> Affordances:
     """Outputs with N = 1 as affordances: probabilities by softmax, the likeliest sign, values in SI units."""
     values: dict[str, Any] = {}

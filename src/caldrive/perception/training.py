@@ -6,28 +6,23 @@ import json
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
-
-import torch
-from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
+from caldrive.perception.beginning import start
 from caldrive.perception.blocks import feature_table, forget_features, learn_blocks
-from caldrive.perception.calibration import calibrated, input_ranges, uncalibrated
+from caldrive.perception.calibration import calibrated, input_ranges
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
 from caldrive.perception.curves import Board, draw_curves
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Lessons, TrainingRun, learning_rate
-from caldrive.perception.sampler import Sampler, summary
-from caldrive.perception.segmentation import STAGE, Segmentation
-from caldrive.perception.specs import SPECS, class_weights
-from caldrive.perception.team import Team, join
+from caldrive.perception.optimisation import TrainingRun, learning_rate
+from caldrive.perception.sampler import summary
+from caldrive.perception.team import join
 from caldrive.progress import Progress, silent
 from caldrive.typed import read_json
 
@@ -45,50 +40,6 @@ def kept_rows(path: Path, step: int) -> list[Row]:
         return [row for row in (read_json(line, Row) for line in lines) if row["step"] <= step]
     except (ValueError, KeyError) as error:
         raise CheckpointError(f"{path} is damaged ({error}): remove the folder, or give another --out") from error
-
-
-def anew(found: PerceptionConfig, wanted: PerceptionConfig) -> list[str]:
-    """Names of the task blocks that cannot be taken from a network, as they are built otherwise than wanted."""
-    pairs = ((spec.name, getattr(found, spec.name), getattr(wanted, spec.name)) for spec in SPECS)
-    return [name for name, old, new in pairs if replace(old, dropout=new.dropout) != new]
-
-
-def _initial(path: str, perception: PerceptionConfig) -> Network:
-    """A network that begins with a trained one's backbone, and with those of its blocks that are built as wanted.
-
-    Raises CheckpointError where the backbone is not.
-    """
-    found, info = load_network(path)
-    wanted = {spec.name: getattr(perception, spec.name) for spec in SPECS}
-    if replace(info.config, **wanted) != perception:
-        raise CheckpointError(f"{path} is a network of another width or image size than wanted: give its --preset")
-    network, found = Network(perception), uncalibrated(found, info.data.get("train_classes", {}))
-    network.backbone.load_state_dict(found.backbone.state_dict())
-    for name in wanted.keys() - set(anew(info.config, perception)):
-        network.blocks[name].load_state_dict(found.blocks[name].state_dict())
-    return network
-
-
-def start(
-    config: TrainingConfig,
-    perception: PerceptionConfig,
-    frames: Frames,
-    imagenet: Path | None,
-    team: Team,
-    initial: str | None = None,
-) -> TrainingRun:
-    """A run at its first step; initial: the network to begin with."""
-    torch.manual_seed(config.seed)
-    network = Network(perception) if initial is None else _initial(initial, perception)
-    if imagenet is not None:
-        network.backbone.load_imagenet(imagenet)
-    head = None
-    if config.segmentation and frames.has_semantics:
-        head = Segmentation(network.backbone.channels[STAGE])
-    lessons = Lessons(network, head).to(team.device)
-    sampler = Sampler(frames, config.window, config.balance, config.seed)
-    weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    return TrainingRun(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
 
 
 def validate(run: TrainingRun, held: Frames, model: Path, context: int) -> Row:
