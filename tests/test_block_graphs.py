@@ -17,9 +17,11 @@ from tests.perception_data import TINY
 
 BLOCKS = [
     BlockConfig("dense", 8),
-    BlockConfig("dense", 8, norm=False, length=4, dilation=3),
+    BlockConfig("dense", 8, norm="none", length=4, dilation=3),
     BlockConfig("tconv", 8, length=5, dilation=2),
-    BlockConfig("tconv", 8, norm=False, length=2),
+    BlockConfig("tconv", 8, norm="none", length=2),
+    BlockConfig("tconv", 8, norm="layer", length=5, dilation=2),
+    BlockConfig("dense", 8, norm="layer"),
 ]
 TESTED = ("hazard_stop", "relative_angle")  # one that is conditional
 
@@ -33,6 +35,8 @@ def made(block: BlockConfig) -> Network:
         if isinstance(module, nn.BatchNorm1d):
             nn.init.uniform_(module.running_mean, -1, 1)
             nn.init.uniform_(module.running_var, 0.5, 2)
+        if isinstance(module, nn.BatchNorm1d | nn.LayerNorm):
+            nn.init.uniform_(module.weight, 0.5, 2)
             nn.init.uniform_(module.bias, -1, 1)
     return network.eval()
 

@@ -100,7 +100,7 @@ def test_other_affordances_and_formats_are_refused(
         with pytest.raises(CheckpointError, match="other affordances"):
             load_network(tmp_path / "model.safetensors")
     monkeypatch.setattr(checkpoint, "FORMAT_VERSION", 99)
-    with pytest.raises(CheckpointError, match="format 1, this caldrive reads 99"):
+    with pytest.raises(CheckpointError, match="format 2, this caldrive reads 99"):
         load_network(tmp_path / "model.safetensors")
 
 

@@ -19,7 +19,7 @@ from tests.perception_data import TINY, record
 
 # Statistics of a batch, dropout and augmentation are each process' own: without them, shares of a batch add up exactly.
 PLAIN = PerceptionConfig(**{
-    name: replace(value, norm=False) if hasattr(value, "norm") else value for name, value in vars(TINY).items()
+    name: replace(value, norm="none") if hasattr(value, "norm") else value for name, value in vars(TINY).items()
 })  # fmt: skip
 PLAIN = replace(PLAIN, batch_norm=False)
 SHORT = TrainingConfig(

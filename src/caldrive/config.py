@@ -150,9 +150,11 @@ class CollectConfig:
 @dataclass(frozen=True)
 class BlockConfig:
     """A task block: kind of layer (dense, lstm, gru or tconv), its nodes (for each command where the affordance is
-    conditional), dropout ratio, length of its sequence in frames, dilation (2: every other frame), batch norm.
+    conditional), dropout ratio, length of its sequence in frames, dilation (2: every other frame), and its norm.
 
-    A conditional block's batch norm sees only the few samples of a batch that have its command: it needs large batches.
+    norm: batch; layer (over a sample's nodes), for conditional blocks, whose batch norm would see only the few samples
+    of a batch that have its command; or none, where a small network's nodes die one after the other: features are
+    never negative, and a few steps at its high rate push all of a node's sums below zero for good.
     """
 
     layer: str = "dense"
@@ -160,7 +162,7 @@ class BlockConfig:
     dropout: float = 0.25
     length: int = 1
     dilation: int = 1
-    norm: bool = True
+    norm: str = "batch"
 
     @property
     def span(self) -> int:
@@ -181,8 +183,8 @@ class PerceptionConfig:
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
     vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
-    relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
-    center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm=False)
+    relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
+    center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
 
 
 PERCEPTIONS = {

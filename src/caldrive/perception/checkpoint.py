@@ -21,7 +21,7 @@ from caldrive.perception.network import Network
 from caldrive.perception.specs import describe
 from caldrive.typed import as_type, read_json
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 KEY = "caldrive"
 
 

@@ -34,7 +34,11 @@ def constant(values: Tensor, *shape: int) -> Any:
 
 
 def normalised(x: Any, norm: nn.Module, *shape: int) -> Any:
-    """Batch norm by its running statistics, whose values get this shape; anything else leaves x as it is."""
+    """Batch norm by its running statistics, or layer norm over the last axis, with gain and shift of this shape;
+    anything else leaves x as it is."""
+    if isinstance(norm, nn.LayerNorm):
+        x = ops.mvn(x, ops.constant(np.array([-1])), True, norm.eps, "inside_sqrt")
+        return ops.add(ops.multiply(x, constant(norm.weight, *shape)), constant(norm.bias, *shape))
     if not isinstance(norm, nn.BatchNorm1d | nn.BatchNorm2d):
         return x
     assert norm.running_var is not None

@@ -25,8 +25,18 @@ class _SafeBatchNorm(nn.BatchNorm1d):
         return super().forward(x)
 
 
+class _LayerNorm(nn.LayerNorm):
+    """Norm over the nodes of (N, nodes) or (N, nodes, steps)."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        return super().forward(x.movedim(1, -1)).movedim(-1, 1)
+
+
+NORMS = {"batch": _SafeBatchNorm, "layer": _LayerNorm, "none": nn.Identity}
+
+
 class NodeGroup(nn.Module):
-    """Task layer, batch norm, dropout and output nodes: (N, length, F) to (N, outputs)."""
+    """Task layer, norm, dropout and output nodes: (N, length, F) to (N, outputs)."""
 
     def __init__(self, config: BlockConfig, n_features: int, n_outputs: int) -> None:
         super().__init__()
@@ -44,7 +54,9 @@ class NodeGroup(nn.Module):
             self.layer = {"gru": nn.GRU, "lstm": nn.LSTM}[config.layer](n_features, config.nodes, batch_first=True)
         else:
             raise ValueError(f"a task block's layer is {config.layer!r}, but must be dense, lstm, gru or tconv")
-        self.norm = _SafeBatchNorm(config.nodes) if config.norm else nn.Identity()
+        if config.norm not in NORMS:
+            raise ValueError(f"a task block's norm is {config.norm!r}, but must be {', '.join(NORMS)}")
+        self.norm = NORMS[config.norm](config.nodes)
         self.dropout = nn.Dropout(config.dropout)
         self.output = nn.Linear(config.nodes * self.steps, n_outputs)
 
