@@ -11,7 +11,7 @@ from safetensors.torch import save_file
 from caldrive.config import PERCEPTIONS, BlockConfig, PerceptionConfig
 from caldrive.perception.backbone import CHANNELS, IMAGENET_LAYERS, Backbone
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
-from caldrive.perception.network import Network, TaskBlock
+from caldrive.perception.network import Network, NodeGroup, TaskBlock
 from caldrive.perception.specs import SPECS
 from tests.perception_data import TINY
 
@@ -139,3 +139,23 @@ def test_imagenet_weights_are_read_as_torch_hub_keeps_them_and_nothing_else_is_u
         path.write_bytes(content)
         with pytest.raises(ValueError, match="no state dict of tensors"):
             backbone.load_imagenet(path)
+
+
+def alive_after_training(norm: str) -> float:
+    """Share of a group's nodes that are ever above zero after steps like those of a training's beginning."""
+    group = NodeGroup(BlockConfig("tconv", 64, 0.0, length=5, norm=norm), 1536, 1).train()
+    optimizer = torch.optim.Adam(group.parameters(), 1e-3)
+    direction, seen = torch.randn(1536) / 1536**0.5, []
+    group.output.register_forward_pre_hook(lambda module, inputs: seen.append(inputs[0].detach()))
+    for _ in range(60):
+        features = torch.randn(32, 1, 1536).relu().expand(-1, 5, -1)
+        loss = (group(features)[:, 0] - features[:, 0] @ direction - 0.5 * torch.randn(32)).abs().mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    return float((torch.stack(seen[-10:]).view(-1, 64, 3) > 0).any(0).any(1).float().mean())
+
+
+def test_a_layer_norm_keeps_half_of_the_nodes_over_many_positive_features_alive() -> None:
+    assert alive_after_training("none") < 0.25
+    assert alive_after_training("layer") > 0.4
