@@ -237,8 +237,9 @@ def test_a_training_says_which_blocks_begin_anew(tmp_path: Path) -> None:
     usual = PerceptionConfig()
     other = replace(usual, hazard_stop=replace(usual.hazard_stop, dilation=5))
     save_network(tmp_path / "other.safetensors", Network(other), CheckpointInfo(other))
-    assert Train(initial=tmp_path / "other.safetensors")._began_anew() == ["hazard_stop"]
-    assert Train(initial=tmp_path / "gone.safetensors")._began_anew() == []
+    assert Train(initial=tmp_path / "other.safetensors", out=tmp_path)._began_anew() == ["hazard_stop"]
+    (tmp_path / "state.safetensors").touch()
+    assert Train(initial=tmp_path / "gone.safetensors", out=tmp_path)._began_anew() == []
 
 
 def test_imagenets_weights_are_asked_for_by_a_training_that_begins_and_not_by_one_that_goes_on(

@@ -19,6 +19,7 @@ Points = NDArray[np.float64]  # (N, 2), metres
 SPEED_SIGNS = (30, 60, 90)  # km/h
 MAX_VEHICLE_DISTANCE = 50.0  # m, also the value for "no vehicle ahead" (Fig. 3 of the paper)
 MAX_CENTER_DISTANCE = 2.0  # m
+HAZARD_DISTANCE = 6.0  # m; a car on its way that is a hazard is nearer, only one that stands across may not be
 
 
 class Command(Enum):

@@ -16,7 +16,7 @@ from caldrive.progress import Progress
 @dataclass(frozen=True)
 class Collect(CollectSettings, Output):
     def run(self, progress: Progress) -> Answer:
-        from caldrive.driving.collection import collect, missing
+        from caldrive.driving.collection import collect
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.driving.tables import counts_table
         from caldrive.perception.folders import class_counts, find_episodes
@@ -24,9 +24,8 @@ class Collect(CollectSettings, Output):
         require_writable_folder(self.out)
         asked = {field.name: getattr(self, field.name) for field in fields(CollectConfig) if hasattr(self, field.name)}
         config = CollectConfig(**asked)
-        for _ in collect(config, self.out, self.workers):
-            there = self.episodes - len(missing(config, self.out))
-            progress(f"recording, {there} of {self.episodes} episodes", there / self.episodes)
+        for _ in collect(config, self.out, self.workers, progress):
+            pass
         counts = class_counts(find_episodes(self.out))
         return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
 
@@ -42,7 +41,7 @@ class Data(DataSettings, Output):
         from caldrive.perception.recordings import check_recording, draw_histograms
 
         require_writable_file(self.picture, "--picture", ".png")
-        found, episodes = check_recording(self.folder, lambda share: progress("checking", share))
+        found, episodes = check_recording(self.folder, progress)
         if episodes:
             draw_histograms(episodes, found.counts, self.picture)
         picture = self.picture if episodes else None
@@ -90,8 +89,9 @@ class Train(TrainSettings, Output):
         """The task blocks that --initial does not give; none where a run is taken up that needs its file no more."""
         from caldrive.perception.beginning import anew
         from caldrive.perception.checkpoint import load_network
+        from caldrive.perception.training import begun
 
-        if self.initial is None or not self.initial.is_file():
+        if self.initial is None or begun(self.out):
             return []
         return anew(load_network(self.initial)[1].config, PERCEPTIONS[self.preset])
 
@@ -117,6 +117,6 @@ class Evaluate(EvaluateSettings, Output):
             episodes = held_out(episodes, info.data)
         frames = Frames(episodes, (network.config.image_height, network.config.image_width))
         features = features_in(precision, network, info)
-        found = report(network, frames, features, self.worst, lambda share: progress("evaluating", share))
+        found = report(network, frames, features, self.worst, progress)
         values = asdict(found) | {"paper": PAPER, "precision": precision}
         return Answer(values, evaluation_table(found, precision))

@@ -20,6 +20,7 @@ from caldrive.driving.pool import spread
 from caldrive.driving.recorder import episode_path, record_episode
 from caldrive.episodes import FORMAT_VERSION
 from caldrive.files import write_whole
+from caldrive.progress import Progress, silent
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.towns import load_town
 from caldrive.world.weather import weather
@@ -84,7 +85,9 @@ def _claim(folder: Path, config: CollectConfig) -> None:
     write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
 
 
-def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[tuple[int, int]]:
+def collect(
+    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent
+) -> Iterator[tuple[int, int]]:
     """Records what is missing in a folder; yields (episode, frames) as they are done.
 
     Where a worker dies, new ones go on. Raises ValueError where the folder holds a recording with other settings,
@@ -92,9 +95,12 @@ def collect(config: CollectConfig, folder: Path, workers: int = 1) -> Iterator[t
     """
     _check(config, workers)
     _claim(folder, config)
-    yield from spread(partial(_record, config, folder), missing(config, folder), workers)
+    left = _missing(config, folder)
+    recorded = spread(partial(_record, config, folder), left, workers)
+    for there, episode in enumerate(recorded, start=config.episodes - len(left) + 1):
+        progress(f"recording, {there} of {config.episodes} episodes", there / config.episodes)
+        yield episode
 
 
-def missing(config: CollectConfig, folder: Path) -> list[int]:
-    """Numbers of the episodes that are not in a folder yet."""
+def _missing(config: CollectConfig, folder: Path) -> list[int]:
     return [k for k in range(config.episodes) if not episode_path(folder, k).exists()]

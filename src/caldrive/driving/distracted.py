@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from caldrive.config import LongitudinalConfig, VehicleConfig
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Observation, Truth
+from caldrive.datatypes import HAZARD_DISTANCE, MAX_VEHICLE_DISTANCE, Affordances, Observation, Truth
 from caldrive.driving.agent import OraclePerception
 from caldrive.geometry import moved
 from caldrive.world.labels import hazard_stop
 
-NEAR = 6.0  # m; a car on its way that is a hazard is nearer, only one that stands across may not be
 LAST = 0.6  # share of its gap at which a tailgater brakes hard after all
 
 
@@ -42,6 +41,6 @@ class Tailgater(OraclePerception):
         true, distance = truth.affordances, truth.affordances.vehicle_distance
         told = min(distance + LongitudinalConfig().follow_gap - self.gap, MAX_VEHICLE_DISTANCE)
         hazard = true.hazard_stop
-        if LAST * self.gap < distance < NEAR:  # the hazard may be the car alone
+        if LAST * self.gap < distance < HAZARD_DISTANCE:  # the hazard may be the car alone
             hazard = float(hazard_stop(moved(truth.ego.pose, forward=self.front_axle), (), truth.pedestrians))
         return replace(true, vehicle_distance=told, hazard_stop=hazard)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +28,7 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.optimisation import TrainingRun, learning_rate
 from caldrive.perception.precision import Features, driving_precision, features_in
 from caldrive.perception.specs import loss
+from caldrive.progress import Progress
 
 FOLDER, CHUNK, BATCH = "features", 8192, 64  # frames in a file, and at once
 
@@ -56,9 +57,9 @@ def _kept(path: Path, digest: str) -> Tensor | None:
     return tensors["features"] if header.get("digest") == digest else None
 
 
-def feature_table(run: TrainingRun, info: CheckpointInfo, out: Path, done: Callable[[int], None]) -> Tensor:
+def feature_table(run: TrainingRun, info: CheckpointInfo, out: Path, progress: Progress) -> Tensor:
     """What the backbone, rounded as it is stored, makes of every frame (N, F); kept in `out`, so that it goes on after
-    a kill. info: of the network as it is stored; done: told how many frames are seen."""
+    a kill. info: of the network as it is stored."""
     network, frames = run.network.cpu().eval(), run.sampler.frames
     round_to_half(network)
     precision = driving_precision("auto", info)
@@ -73,7 +74,7 @@ def feature_table(run: TrainingRun, info: CheckpointInfo, out: Path, done: Calla
             part = _see(frames, ids, features)
             write_tensors(path, {"features": part}, {"kind": "features", "digest": digest})
         table[ids[0] : ids[-1] + 1] = part
-        done(int(ids[-1]) + 1)
+        progress("features", (int(ids[-1]) + 1) / len(frames))
     return table
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import torch
 from torch import Tensor
@@ -13,13 +11,9 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network import Network
 from caldrive.perception.precision import Features, autocast
 from caldrive.perception.specs import Outputs, Targets, losses, metrics
+from caldrive.progress import Progress, silent
 
 BATCH = 128  # frames that are evaluated together
-Done = Callable[[float], None]  # told the share that is done
-
-
-def unwatched(share: float) -> None:
-    """Progress that nobody follows."""
 
 
 @torch.no_grad()
@@ -28,7 +22,7 @@ def outputs_on(
     frames: Frames,
     features: Features,
     device: str = "cpu",
-    progress: Done = unwatched,
+    progress: Progress = silent,
     context: int | None = None,
 ) -> tuple[Outputs, Targets]:
     """Outputs (N, K) and targets (N,) on all frames. features: the network's backbone; context: frames of history that
@@ -41,7 +35,7 @@ def outputs_on(
         seen = features(normalise(to_float(batch.images)).to(device)).float()
         outputs.append(network(seen[batch.index.to(device)], batch.command.to(device)))
         targets.append(batch.targets)
-        progress(first / len(frames))
+        progress("evaluating", first / len(frames))
     joined = {name: torch.cat([o[name].float().cpu() for o in outputs]) for name in outputs[0]}
     return joined, {name: torch.cat([t[name] for t in targets]) for name in targets[0]}
 

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.datatypes import HAZARD_DISTANCE
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
 from caldrive.perception.specs import SPECS
-
-NEAR = 6.0  # m; a car ahead that is a hazard is nearer
 
 
 def episode_paths(folder: Path | str) -> list[Path]:
@@ -42,7 +41,7 @@ def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
     junction, and have to stop for a person or a car across and not for the car ahead."""
     columns = {name: joined(episodes, name) for name in (*(s.name for s in SPECS if s.discrete), "command")}
     columns["turn"] = columns["command"][joined(episodes, "junction")]
-    near = joined(episodes, "vehicle_distance")[columns["hazard_stop"] > 0] < NEAR
+    near = joined(episodes, "vehicle_distance")[columns["hazard_stop"] > 0] < HAZARD_DISTANCE
     columns["hazard_by"] = np.where(near, "car ahead", "person or car across")
     found = {}
     for name, column in columns.items():

@@ -11,9 +11,9 @@ import numpy as np
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
 from caldrive.files import write_figure
-from caldrive.perception.evaluation import Done, unwatched
 from caldrive.perception.folders import class_counts, episode_paths, joined
 from caldrive.perception.repaint import FREEDOM
+from caldrive.progress import Progress, silent
 
 HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
     "vehicle_distance": (np.linspace(0, 50, 26), "m"),
@@ -48,7 +48,7 @@ def check_episode(path: Path) -> Episode:
     return replace(episode, semantics=None)
 
 
-def check_recording(folder: Path, progress: Done = unwatched) -> tuple[Recording, list[Episode]]:
+def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recording, list[Episode]]:
     """Reads all episodes of a folder; returns what they hold, and those that are sound.
 
     Raises EpisodeError where there is no episode at all.
@@ -56,7 +56,7 @@ def check_recording(folder: Path, progress: Done = unwatched) -> tuple[Recording
     paths = episode_paths(folder)
     sound, damaged = [], []
     for k, path in enumerate(paths):
-        progress(k / len(paths))
+        progress("checking", k / len(paths))
         try:
             sound.append(check_episode(path))
         except EpisodeError as error:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from caldrive.files import write_figure
 from caldrive.perception.dataset import Frames
-from caldrive.perception.evaluation import Done, outputs_on, unwatched
+from caldrive.perception.evaluation import outputs_on
 from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import Features
 from caldrive.perception.sampler import SIZES
 from caldrive.perception.specs import SPECS, Outputs, Spec, Targets, confusion, metrics
+from caldrive.progress import Progress, silent
 
 # Supplement, comparison of temporal and non-temporal task blocks: the better of the two.
 PAPER = {
@@ -59,7 +60,7 @@ def _ranges(size: NDArray[np.float64], edges: Sequence[float], unit: str, beyond
 
 
 def report(
-    network: Network, frames: Frames, features: Features, picture: Path | None = None, progress: Done = unwatched
+    network: Network, frames: Frames, features: Features, picture: Path | None = None, progress: Progress = silent
 ) -> Report:
     """Runs the network over all frames. features: its backbone; picture: where to draw the worst ones (PNG)."""
     outputs, targets = outputs_on(network, frames, features, progress=progress)

@@ -118,7 +118,7 @@ def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: B
         forget_features(out)
         return
     info = load_network(out / MODEL)[1]
-    features = feature_table(run, info, out, lambda n: progress("features", n / len(run.sampler.frames)))
+    features = feature_table(run, info, out, progress)
     for step, loss in enumerate(learn_blocks(run, features), start=1):
         rows.append({"step": run.config.steps + step, "loss": _number(loss, run.config.steps + step)})
         board.add(rows[-1])
