@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
 from caldrive.config import CameraConfig
 from caldrive.datatypes import Sign, VehicleState
@@ -64,6 +65,17 @@ def test_the_limit_on_a_sign_is_the_one_that_counts(roads: RoadNetwork) -> None:
     drawn = {(prop.pose, prop.label) for prop in world.scenery if prop.kind == "sign_post"}
     assert drawn == {(sign.pose, sign.limit) for sign in world.signs}
     assert drawn != {(sign.pose, sign.limit) for sign in roads.signs}
+
+
+def test_things_of_no_particular_kind_stand_beside_made_up_streets_only(roads: RoadNetwork) -> None:
+    odd = {"oddment", "shed"}
+    assert not odd & {prop.kind for town in TOWNS for prop in build_scenery(load_town(town))}
+    props = [prop for prop in build_scenery(roads, 4) if prop.kind in odd]
+    assert {prop.kind for prop in props} == odd
+    assert len({(prop.length, prop.width, prop.height) for prop in props}) == 5
+    shapely.prepare(roads.roadway)
+    reach = [shapely.Point(prop.pose.x, prop.pose.y).buffer(prop.length / 2) for prop in props]
+    assert not shapely.intersects(roads.roadway, reach).any()
 
 
 def test_houses_keep_two_floors_whatever_the_decor() -> None:

@@ -130,7 +130,7 @@ class CollectConfig:
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 8, 3, 1, 8, 6)
-    episodes: int = 1400
+    episodes: int = 1800
     duration: float = 12.0
     cars: int = 75
     people: int = 70
@@ -219,7 +219,7 @@ class TrainingConfig:
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
     """
 
-    steps: int = 7_000
+    steps: int = 9_000
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3

@@ -21,7 +21,8 @@ FREEDOM = (0.5, 0.5, 0.2, 1.0, 1.0, 1.0, 0.8, 0.8, 0.0, 0.0, 0.4, 0.4)
 SCALES = (1, 2, 4, 8)  # pixels of a grain
 # What patches may cover: the sky, sidewalks, ground, buildings, plants and furniture.
 COVERED = np.array((1, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0), bool)
-SHADED = np.array((0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0), bool)  # what shadows fall on: road, lines, sidewalk, ground
+# What light and shadows fall on: road, lines, sidewalks, ground, buildings, plants and furniture.
+SHADED = np.array((0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0), bool)
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,8 @@ def _patch(images: Tensor, kinds: NDArray[np.uint8], rows: Tensor, groups: Tenso
 
 
 def _shade(images: Tensor, kinds: NDArray[np.uint8], rows: Tensor, groups: Tensor, most: int, seed: int) -> None:
-    """Shadows and light with straight edges on the ground, as a house's edge throws them: no lane ends there."""
+    """Shadows and light of any warmth with straight edges, as a house's edge throws them: no lane ends there, and a
+    strip of evening sun on a wall is no lamp."""
     y, x = np.mgrid[0 : images.shape[2], 0 : images.shape[3]].astype(np.float32)
     for row in rows.tolist():
         rng = np.random.default_rng((seed, 1, int(groups[row])))
@@ -85,7 +87,8 @@ def _shade(images: Tensor, kinds: NDArray[np.uint8], rows: Tensor, groups: Tenso
             angle, through = rng.uniform(0, 2 * np.pi), rng.random(2) * images.shape[2:]
             beyond = (y - through[0]) * np.sin(angle) + (x - through[1]) * np.cos(angle)
             inside = (beyond > 0) & (beyond < rng.uniform(0.1, 2.0) * images.shape[3]) & SHADED[kinds[row]]
-            factor = np.where(inside, np.float32(np.exp(rng.uniform(-1.1, 0.5))), np.float32(1))
+            light = np.exp(rng.uniform(-1.1, 0.5)) * (1 + rng.uniform(-0.3, 0.3, (3, 1, 1)))
+            factor = np.where(inside, light, 1.0).astype(np.float32)
             images[row].mul_(torch.from_numpy(factor)).clamp_(max=1)
 
 

@@ -73,6 +73,33 @@ class Crown:
 
 
 @dataclass(frozen=True)
+class Oddment:
+    """A box of no particular kind. length (towards the road), width and height in m."""
+
+    length: float
+    width: float
+    height: float
+    color: RGB
+    layer: Tex
+
+
+@dataclass(frozen=True)
+class Furniture:
+    """Colours of street furniture, and what else stands at the back of sidewalks (oddments) and between houses (shed).
+
+    hues: of boxes and containers. gap: least and most metres between small things on a sidewalk.
+    """
+
+    hues: tuple[RGB, ...] = ((168, 60, 48), (52, 92, 140), (214, 170, 62), (74, 124, 82))
+    bench: RGB = (138, 96, 62)
+    bin: RGB = (66, 92, 72)
+    hydrant: RGB = (196, 44, 36)
+    gap: tuple[float, float] = (14, 40)
+    oddments: tuple[Oddment, ...] = ()
+    shed: Oddment | None = None
+
+
+@dataclass(frozen=True)
 class Decor:
     """All of it. sun: azimuth in rad. arm: length in m of a street lamp's arm, 0 for a lantern on its post."""
 
@@ -84,6 +111,7 @@ class Decor:
     fence: RGB
     sun: float
     arm: float
+    furniture: Furniture = Furniture()
 
 
 _BARK, _DARK = (104, 84, 66), (84, 66, 54)

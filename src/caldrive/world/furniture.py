@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from caldrive.world.decor import Crown, Decor
+from caldrive.world.decor import Crown, Decor, Oddment
 from caldrive.world.meshes import RGB, Detail, Mesh, box, disc, lathe, merge, packed, quads, smooth
 from caldrive.world.scenery import Prop
 from caldrive.world.semantics import PROP_CLASSES, Semantic, classed_detail
@@ -84,9 +84,9 @@ def _lamp(reach: float) -> Detail:
     return Detail(_pole(4.0, 0.06, (52, 60, 54), 3), lantern, lathe(((0.09, 4.0), (0.24, 4.5)), 3, (52, 60, 54)))
 
 
-def _bench() -> Mesh:
-    seat = box((0, 0, 0.43), (0.45, 1.7, 0.06), (138, 96, 62))
-    back = box((-0.22, 0, 0.72), (0.05, 1.7, 0.3), (138, 96, 62))
+def _bench(color: RGB) -> Mesh:
+    seat = box((0, 0, 0.43), (0.45, 1.7, 0.06), color)
+    back = box((-0.22, 0, 0.72), (0.05, 1.7, 0.3), color)
     legs = [box((0, y, 0.2), (0.4, 0.07, 0.4), (70, 70, 72)) for y in (-0.7, 0.7)]
     return merge((seat, back, *legs))
 
@@ -100,9 +100,14 @@ def _billboard(variant: int) -> Detail:
     return Detail(merge((quads(panel, (255, 255, 255), uv), box((0, 0, 2.9), (0.2, 4.6, 3.0), frame), *legs)))
 
 
+def _oddment(thing: Oddment) -> Detail:
+    middle, size = (0, 0, thing.height / 2), (thing.length, thing.width, thing.height + 0.1)
+    return Detail(box(middle, size, thing.color, thing.layer, 2.0))
+
+
 def _template(kind: str, variant: int, label: int, decor: Decor) -> Detail:
-    hues: tuple[RGB, ...] = ((168, 60, 48), (52, 92, 140), (214, 170, 62), (74, 124, 82))
-    hue = hues[variant % 4]
+    furniture = decor.furniture
+    hue = furniture.hues[variant % 4]
     if kind == "light_post":
         return _light_post()
     if kind == "sign_post":
@@ -121,11 +126,15 @@ def _template(kind: str, variant: int, label: int, decor: Decor) -> Detail:
         return Detail(box((0, 0, 0.95), (0.3, 8.0, 2.0), (176, 160, 150), Tex.BRICKS, 2.4))
     if kind == "container":
         return Detail(box((0, 0, 1.25), (2.4, 6.0, 2.6), hue, Tex.TILES, 2.0))
+    if kind == "oddment":
+        return _oddment(furniture.oddments[variant])
+    if kind == "shed" and furniture.shed:
+        return _oddment(furniture.shed)
     small = {
-        "bin": lambda: lathe(((0.2, 0.0), (0.23, 0.9), (0.0, 0.98)), 6, (66, 92, 72)),
-        "hydrant": lambda: lathe(((0.14, 0.0), (0.12, 0.6), (0.0, 0.75)), 6, (196, 44, 36)),
+        "bin": lambda: lathe(((0.2, 0.0), (0.23, 0.9), (0.0, 0.98)), 6, furniture.bin),
+        "hydrant": lambda: lathe(((0.14, 0.0), (0.12, 0.6), (0.0, 0.75)), 6, furniture.hydrant),
         "box": lambda: box((0, 0, 0.6), (0.5, 0.9, 1.3), hue),
-        "bench": _bench,
+        "bench": lambda: _bench(furniture.bench),
     }
     return Detail(near=small[kind]())
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Sign
-from caldrive.world.decor import TOWNS, Color, Crown, Decor, Design, Ground, Paint, Style
+from caldrive.world.decor import TOWNS, Color, Crown, Decor, Design, Furniture, Ground, Oddment, Paint, Style
 from caldrive.world.meshes import RGB
 from caldrive.world.textures import Tex
 
@@ -27,6 +27,7 @@ INVENTED = tuple(tex for tex in Tex if tex.name.startswith("INVENTED"))
 PAVINGS = (Tex.PLAIN, Tex.ASPHALT, Tex.SLABS, Tex.GRASS, Tex.TILES, Tex.PLATES, Tex.SETTS, Tex.PLANKS, Tex.CONCRETE)
 YARDS = (*PAVINGS, Tex.LEAVES)
 UPPER = (Tex.SASH, Tex.PANE, Tex.BALCONY, Tex.PLAIN, Tex.CONCRETE, Tex.SETTS, *INVENTED, *INVENTED)
+IN_GAPS = ("hedge", "billboard", "fence", "shed", "shed")
 GROUND_FLOOR = (Tex.HALL, Tex.SHOP, Tex.PLANKS, Tex.PLATES, *INVENTED)
 
 
@@ -39,6 +40,7 @@ def redecorated(town: str, arrangement: int) -> Decor:
         _style(rng), _paint(rng), _ground(rng), tuple(_design(rng) for _ in range(N_DESIGNS)),
         tuple(_crown(crown, rng) for crown in TOWNS["town01"].crowns), fence=_tint(rng, 80, 230, 0.3),
         sun=float(rng.uniform(-math.pi, math.pi)), arm=float(rng.choice([0.0, 0.5, 1.0, 1.5])),
+        furniture=_furniture(rng),
     )  # fmt: skip
 
 
@@ -84,6 +86,7 @@ def _style(rng: np.random.Generator) -> Style:
         TOWNS["town01"].style, frontage=_range(rng, 7, 20, 12), depth=_range(rng, 7, 13, 5),
         floors=(floors, floors + int(rng.integers(0, 5))), floor=float(rng.uniform(2.6, 4.2)),
         gap=float(rng.uniform(0.05, 0.6)), tree_gap=_range(rng, 7, 30, 20), tree_height=_range(rng, 3.5, 8.0, 3.5),
+        in_gaps=IN_GAPS,
     )  # fmt: skip
 
 
@@ -116,3 +119,16 @@ def _crown(crown: Crown, rng: np.random.Generator) -> Crown:
     profile = tuple((r * wide, z + foot * (6.0 - z) / 4.0) for r, z in crown.profile)
     color = _tint(rng, 60, 190, 0.5)
     return Crown(profile, color, one_of((Tex.LEAVES, Tex.LEAVES, Tex.GRASS), rng), _tint(rng, 50, 200, 0.2))
+
+
+def _oddment(rng: np.random.Generator, length: float, width: float, height: float) -> Oddment:
+    """A box with at least a quarter of the sizes in m, of any colour."""
+    length, width, height = (np.array((length, width, height)) * rng.uniform(0.25, 1.0, 3)).tolist()
+    return Oddment(length, width, height, _tint(rng, 30, 240, 0.9), one_of((*PAVINGS, *INVENTED), rng))
+
+
+def _furniture(rng: np.random.Generator) -> Furniture:
+    hues = tuple(_tint(rng, 40, 220, 0.7) for _ in range(4))
+    bench, bin, hydrant = (_tint(rng, 30, 230, 0.7) for _ in range(3))
+    oddments = tuple(_oddment(rng, 1.2, 2.0, 2.4) for _ in range(4))
+    return Furniture(hues, bench, bin, hydrant, _range(rng, 6, 20, 20), oddments, _oddment(rng, 4.0, 7.0, 4.0))

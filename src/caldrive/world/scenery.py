@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
-from caldrive.world.decor import Style
+from caldrive.world.decor import Decor, Furniture, Style
 from caldrive.world.redecoration import N_DESIGNS, redecorated, shown_signs
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 
@@ -51,6 +51,12 @@ _SIZES = {  # length (towards the road), width, height in metres
     "box": (0.5, 0.9, 1.25), "hedge": (0.9, 7.0, 1.3), "fence": (0.15, 8.0, 1.5), "wall": (0.3, 8.0, 2.0),
     "container": (2.4, 6.0, 2.6), "billboard": (0.4, 4.6, 4.4),
 }  # fmt: skip
+
+
+def _size(kind: str, variant: int, furniture: Furniture) -> tuple[float, float, float]:
+    """Length, width and height of a kind of furniture."""
+    odd = furniture.oddments[variant] if kind == "oddment" else furniture.shed if kind == "shed" else None
+    return (odd.length, odd.width, odd.height) if odd else _SIZES[kind]
 
 
 class _Line:
@@ -119,8 +125,9 @@ def _plots(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> tuple[
     return middles, outward, width
 
 
-def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> Iterator[Prop]:
+def _buildings(roads: RoadNetwork, decor: Decor, rng: np.random.Generator) -> Iterator[Prop]:
     """Houses on their plots, and what stands in the gaps between them."""
+    style = decor.style
     middles, outward, frontage = _plots(roads, style, rng)
     n = len(frontage)
     width, depth = frontage - rng.uniform(0.1, 0.9, n), rng.uniform(*style.depth, n)
@@ -141,7 +148,7 @@ def _buildings(roads: RoadNetwork, style: Style, rng: np.random.Generator) -> It
         yield Prop("building", pose, float(depth[i]), float(width[i]), float(floors[i] * style.floor), int(variant[i]))
     houses = _boxes(center[chosen], outward[chosen], depth[chosen] + 0.5, width[chosen] + 0.5)
     empty = np.setdiff1d(np.arange(n), chosen)
-    yield from _in_gaps(middles[empty], outward[empty], shapely.union_all(houses), keep_off, style, rng)
+    yield from _in_gaps(middles[empty], outward[empty], shapely.union_all(houses), keep_off, decor, rng)
 
 
 def _in_gaps(
@@ -149,17 +156,19 @@ def _in_gaps(
     outward: Floats,
     houses: shapely.Geometry,
     keep_off: shapely.Geometry,
-    style: Style,
+    decor: Decor,
     rng: np.random.Generator,
 ) -> Iterator[Prop]:
-    kinds = [style.in_gaps[k] for k in rng.integers(len(style.in_gaps), size=len(at))]
-    length, width = (np.array([_SIZES[kind][k] for kind in kinds]) for k in (0, 1))
+    choice = decor.style.in_gaps
+    kinds = [choice[k] for k in rng.integers(len(choice), size=len(at))]
+    sizes = tuple(_size(kind, 0, decor.furniture) for kind in kinds)
+    length, width = (np.array([size[k] for size in sizes]) for k in (0, 1))
     center = _beyond(at, outward, length / 2 + 0.3)
     shapes = _boxes(center, outward, length, width)
     free = ~shapely.intersects(houses, shapes) & ~shapely.intersects(keep_off, shapes)
     for i in np.flatnonzero(free)[_without_overlaps(shapes[free])]:
         pose = _facing_road(center[i], outward[i])
-        yield Prop(kinds[i], pose, *_SIZES[kinds[i]], variant=int(rng.integers(4)))
+        yield Prop(kinds[i], pose, *sizes[int(i)], int(rng.integers(4)))
 
 
 def _along(
@@ -189,16 +198,17 @@ def _trees(roads: RoadNetwork, style: Style, posts: Sequence[Prop], rng: np.rand
 
 
 def _furniture(
-    roads: RoadNetwork, posts: Sequence[Prop], trees: Sequence[Prop], rng: np.random.Generator
+    roads: RoadNetwork, posts: Sequence[Prop], trees: Sequence[Prop], look: Furniture, rng: np.random.Generator
 ) -> Iterator[Prop]:
     """Street lamps along the kerb, well away from posts; small things at the back of the sidewalk."""
-    small = ("bin", "bench", "hydrant", "box")
-    for distance, gap, kinds, clear in ((LAMP_LINE, (22, 30), ("lamp",), 12.0), (TREE_LINE, (14, 40), small, 2.5)):
+    small = ("bin", "bench", "hydrant", "box", *("oddment" for _ in look.oddments))
+    for distance, gap, kinds, clear in ((LAMP_LINE, (22, 30), ("lamp",), 12.0), (TREE_LINE, look.gap, small, 2.5)):
         at, outward = _along(roads, distance, gap, rng)
         chosen = rng.integers(len(kinds), size=len(at))
         for i in np.flatnonzero(_clear(at, posts, clear) & _clear(at, trees, 2.5)):
             pose = _facing_road(at[i], outward[i])
-            yield Prop(kinds[chosen[i]], pose, *_SIZES[kinds[chosen[i]]], variant=int(rng.integers(4)))
+            kind, variant = kinds[chosen[i]], int(rng.integers(4))
+            yield Prop(kind, pose, *_size(kind, variant, look), variant)
 
 
 def _posts(roads: RoadNetwork, arrangement: int) -> Iterator[Prop]:
@@ -215,8 +225,8 @@ def build_scenery(roads: RoadNetwork, arrangement: int = 0) -> tuple[Prop, ...]:
     limits on the fast ones.
     """
     rng = np.random.default_rng([zlib.crc32(roads.name.encode()), *([arrangement] if arrangement else [])])
-    style = redecorated(roads.style, arrangement).style
+    decor = redecorated(roads.style, arrangement)
     posts = tuple(_posts(roads, arrangement))
-    buildings = tuple(_buildings(roads, style, rng))
-    trees = tuple(_trees(roads, style, posts, rng))
-    return (*posts, *buildings, *trees, *_furniture(roads, posts, trees, rng))
+    buildings = tuple(_buildings(roads, decor, rng))
+    trees = tuple(_trees(roads, decor.style, posts, rng))
+    return (*posts, *buildings, *trees, *_furniture(roads, posts, trees, decor.furniture, rng))
