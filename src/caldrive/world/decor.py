@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from caldrive.world.meshes import RGB
 from caldrive.world.textures import Tex
 
+N_VARIANTS = 4  # of each kind of street furniture
 Color = tuple[float, float, float]  # shares of full brightness
 Profile = tuple[tuple[float, float], ...]  # (radius, height) in m from the foot upwards
 
@@ -97,6 +98,12 @@ class Furniture:
     gap: tuple[float, float] = (14, 40)
     oddments: tuple[Oddment, ...] = ()
     shed: Oddment | None = None
+
+    def oddment(self, kind: str, variant: int) -> Oddment | None:
+        """The box that a kind of prop is; None for one that has a form of its own."""
+        if kind == "oddment":
+            return self.oddments[variant]
+        return self.shed if kind == "shed" else None
 
 
 @dataclass(frozen=True)

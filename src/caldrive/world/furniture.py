@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from caldrive.world.decor import Crown, Decor, Oddment
+from caldrive.world.decor import N_VARIANTS, Crown, Decor, Oddment
 from caldrive.world.meshes import RGB, Detail, Mesh, box, disc, lathe, merge, packed, quads, smooth
 from caldrive.world.scenery import Prop
 from caldrive.world.semantics import PROP_CLASSES, Semantic, classed_detail
@@ -107,7 +107,9 @@ def _oddment(thing: Oddment) -> Detail:
 
 def _template(kind: str, variant: int, label: int, decor: Decor) -> Detail:
     furniture = decor.furniture
-    hue = furniture.hues[variant % 4]
+    if odd := furniture.oddment(kind, variant):
+        return _oddment(odd)
+    hue = furniture.hues[variant % N_VARIANTS]
     if kind == "light_post":
         return _light_post()
     if kind == "sign_post":
@@ -126,10 +128,6 @@ def _template(kind: str, variant: int, label: int, decor: Decor) -> Detail:
         return Detail(box((0, 0, 0.95), (0.3, 8.0, 2.0), (176, 160, 150), Tex.BRICKS, 2.4))
     if kind == "container":
         return Detail(box((0, 0, 1.25), (2.4, 6.0, 2.6), hue, Tex.TILES, 2.0))
-    if kind == "oddment":
-        return _oddment(furniture.oddments[variant])
-    if kind == "shed" and furniture.shed:
-        return _oddment(furniture.shed)
     small = {
         "bin": lambda: lathe(((0.2, 0.0), (0.23, 0.9), (0.0, 0.98)), 6, furniture.bin),
         "hydrant": lambda: lathe(((0.14, 0.0), (0.12, 0.6), (0.0, 0.75)), 6, furniture.hydrant),

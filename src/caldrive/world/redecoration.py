@@ -16,7 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Sign
-from caldrive.world.decor import TOWNS, Color, Crown, Decor, Design, Furniture, Ground, Oddment, Paint, Style
+from caldrive.world.decor import (
+    N_VARIANTS,
+    TOWNS,
+    Color,
+    Crown,
+    Decor,
+    Design,
+    Furniture,
+    Ground,
+    Oddment,
+    Paint,
+    Style,
+)
 from caldrive.world.meshes import RGB
 from caldrive.world.textures import Tex
 
@@ -128,7 +140,7 @@ def _oddment(rng: np.random.Generator, length: float, width: float, height: floa
 
 
 def _furniture(rng: np.random.Generator) -> Furniture:
-    hues = tuple(_tint(rng, 40, 220, 0.7) for _ in range(4))
+    hues = tuple(_tint(rng, 40, 220, 0.7) for _ in range(N_VARIANTS))
     bench, bin, hydrant = (_tint(rng, 30, 230, 0.7) for _ in range(3))
-    oddments = tuple(_oddment(rng, 1.2, 2.0, 2.4) for _ in range(4))
+    oddments = tuple(_oddment(rng, 1.2, 2.0, 2.4) for _ in range(N_VARIANTS))
     return Furniture(hues, bench, bin, hydrant, _range(rng, 6, 20, 20), oddments, _oddment(rng, 4.0, 7.0, 4.0))

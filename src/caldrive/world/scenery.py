@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
-from caldrive.world.decor import Decor, Furniture, Style
+from caldrive.world.decor import N_VARIANTS, Decor, Furniture, Style
 from caldrive.world.redecoration import N_DESIGNS, redecorated, shown_signs
 from caldrive.world.roads import SIDEWALK_WIDTH, RoadNetwork
 
@@ -55,7 +55,7 @@ _SIZES = {  # length (towards the road), width, height in metres
 
 def _size(kind: str, variant: int, furniture: Furniture) -> tuple[float, float, float]:
     """Length, width and height of a kind of furniture."""
-    odd = furniture.oddments[variant] if kind == "oddment" else furniture.shed if kind == "shed" else None
+    odd = furniture.oddment(kind, variant)
     return (odd.length, odd.width, odd.height) if odd else _SIZES[kind]
 
 
@@ -162,13 +162,13 @@ def _in_gaps(
     choice = decor.style.in_gaps
     kinds = [choice[k] for k in rng.integers(len(choice), size=len(at))]
     sizes = tuple(_size(kind, 0, decor.furniture) for kind in kinds)
-    length, width = (np.array([size[k] for size in sizes]) for k in (0, 1))
+    length, width, _ = np.array(sizes).reshape(-1, 3).T
     center = _beyond(at, outward, length / 2 + 0.3)
     shapes = _boxes(center, outward, length, width)
     free = ~shapely.intersects(houses, shapes) & ~shapely.intersects(keep_off, shapes)
     for i in np.flatnonzero(free)[_without_overlaps(shapes[free])]:
         pose = _facing_road(center[i], outward[i])
-        yield Prop(kinds[i], pose, *sizes[int(i)], int(rng.integers(4)))
+        yield Prop(kinds[i], pose, *sizes[int(i)], int(rng.integers(N_VARIANTS)))
 
 
 def _along(
@@ -207,7 +207,7 @@ def _furniture(
         chosen = rng.integers(len(kinds), size=len(at))
         for i in np.flatnonzero(_clear(at, posts, clear) & _clear(at, trees, 2.5)):
             pose = _facing_road(at[i], outward[i])
-            kind, variant = kinds[chosen[i]], int(rng.integers(4))
+            kind, variant = kinds[chosen[i]], int(rng.integers(N_VARIANTS))
             yield Prop(kind, pose, *_size(kind, variant, look), variant)
 
 
