@@ -68,11 +68,11 @@ def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recordin
 
 
 def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], path: Path) -> None:
-    """A picture (PNG) of how often each value of each label occurs."""
+    """A picture (PNG) of how often each value of each label occurs, all on one logarithmic scale of frames."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(16, 6), layout="constrained")
-    axes = figure.subplots(2, 5).ravel()
+    axes = figure.subplots(2, 5, sharey=True).ravel()
     for ax, (name, values) in zip(axes, counts.items(), strict=False):
         ax.bar([one.replace(" or ", " or\n") for one in values], list(values.values()), color="#3b6ea5")
         ax.set(title=name.replace("_", " "), yscale="log", ylabel="frames")
