@@ -93,4 +93,7 @@ def _print(answer: Answer, as_json: bool) -> None:
         return
     from rich.console import Console
 
-    Console().print(answer.shown, highlight=False, soft_wrap=isinstance(answer.shown, str))
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, 120)  # at the 80 columns that a file gets, tables lose digits
+    console.print(answer.shown, highlight=False, soft_wrap=isinstance(answer.shown, str))
