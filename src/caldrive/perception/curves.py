@@ -36,7 +36,8 @@ def draw_curves(rows: Sequence[Mapping[str, float]], path: Path) -> None:
     """Writes a PNG of a run's metrics, a row a step with `step`, `loss` and now and then `validation/<figure>`."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14, 6), layout="constrained")
+    figure = Figure(figsize=(14, 6))
+    figure.subplots_adjust(0.06, 0.08, 0.99, 0.94, wspace=0.22, hspace=0.32)  # "constrained" would take twice as long
     axes = figure.subplots(2, 4).ravel()
     step, loss = (np.array([row[name] for row in rows]) for name in ("step", "loss"))
     width = min(SMOOTH, len(rows))
