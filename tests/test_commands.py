@@ -15,9 +15,12 @@ import av
 import numpy as np
 import pytest
 from PIL import Image as Picture
+from rich.table import Table
+from rich.text import Text
 
 import caldrive
-from caldrive.cli import main
+from caldrive.cli import _print, main
+from caldrive.commands.answer import Answer
 from caldrive.config import BlockConfig, PerceptionConfig
 from caldrive.datatypes import Command, Observation
 from caldrive.driving.determinism import Digests, compare
@@ -93,6 +96,15 @@ def test_drive_films_all_episodes_in_one_video(driven: tuple[dict[str, Any], Pat
     assert sorted(p.name for p in out.iterdir()) == [
         *("drive.mp4", "episode-000.json", "episode-000.png", "episode-001.json", "episode-001.png")
     ]
+
+
+def test_a_table_in_a_file_keeps_all_its_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    figures = [f"{k}0/100  {k}0 % (80-100)  paper 64" for k in range(5)]
+    table = Table()
+    table.add_row(*(Text(one, no_wrap=True) for one in figures))
+    _print(Answer({}, table), as_json=False)
+    shown = capsys.readouterr().out
+    assert all(one in shown for one in figures)
 
 
 def test_strict_ends_with_1_where_a_goal_was_not_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

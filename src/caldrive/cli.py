@@ -95,5 +95,5 @@ def _print(answer: Answer, as_json: bool) -> None:
 
     console = Console()
     if not console.is_terminal:
-        console.width = max(console.width, 120)  # at the 80 columns that a file gets, tables lose digits
+        console.width = 200  # a table takes what it needs; at the 80 columns that a file gets it would lose digits
     console.print(answer.shown, highlight=False, soft_wrap=isinstance(answer.shown, str))
