@@ -229,7 +229,7 @@ class TrainingConfig:
     clip: float = 5.0
     balance: float = 0.5
     augment: bool = True
-    angle_weight: float = 5.0
+    angle_weight: float = 1.0
     segmentation: float = 0.5
     block_steps: int = 3_000
     block_batch: int = 256
@@ -247,6 +247,6 @@ TRAININGS = {
     "small": TrainingConfig(),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
     "paper": TrainingConfig(
-        steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0, angle_weight=1.0, block_steps=0
+        steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0, block_steps=0
     ),
 }

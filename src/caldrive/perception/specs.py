@@ -118,9 +118,7 @@ def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = No
     return result
 
 
-def loss(
-    outputs: Outputs, targets: Targets, weights: ClassWeights | None = None, angle_weight: float = 1.0
-) -> Tensor:
+def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None, angle_weight: float = 1.0) -> Tensor:
     """The whole loss: those of all affordances added, the relative angle's times angle_weight."""
     parts = losses(outputs, targets, weights)
     if "relative_angle" in parts:
