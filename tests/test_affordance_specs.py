@@ -74,6 +74,14 @@ def test_the_loss_adds_all_six_in_scaled_units() -> None:
     assert float(loss(outputs, targets)) == pytest.approx(0.75, abs=1e-6)
 
 
+def test_the_relative_angle_may_count_more_than_the_others() -> None:
+    targets = encode(Affordances())
+    outputs = perfect_outputs(targets)
+    outputs["relative_angle"] = outputs["relative_angle"] + 0.5
+    outputs["center_distance"] = outputs["center_distance"] + 0.25
+    assert float(loss(outputs, targets, angle_weight=5.0)) == pytest.approx(2.75, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "limit"),
     [("vehicle_distance", 50.0), ("center_distance", 2.0), ("center_distance", -2.0), ("relative_angle", -math.pi)],

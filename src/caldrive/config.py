@@ -210,6 +210,7 @@ class TrainingConfig:
     """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
+    angle_weight: what the relative angle's loss counts among the six while the backbone learns; the others count 1.
     segmentation: weight of the second lesson's loss, where the recording has semantic images; 0 leaves it out.
     block_steps: after the others, steps in which the task blocks that look back learn alone, from block_batch windows
     with their history, whose frames the finished backbone saw once; until then a window is seen as if its stream began
@@ -228,6 +229,7 @@ class TrainingConfig:
     clip: float = 5.0
     balance: float = 0.5
     augment: bool = True
+    angle_weight: float = 1.0
     segmentation: float = 0.5
     block_steps: int = 3_000
     block_batch: int = 256

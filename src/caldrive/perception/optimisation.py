@@ -103,7 +103,7 @@ class TrainingRun:
         self.model.train()
         with autocast(config.precision, team.device):
             outputs = self.model(*(x.to(team.device) for x in (images, batch.index, batch.command)))
-        total = loss(outputs, targets, self.weights)
+        total = loss(outputs, targets, self.weights, config.angle_weight)
         if batch.semantics is not None and "segmentation" in outputs:
             second = segmentation_loss(outputs["segmentation"], batch.semantics, generator)
             total = total + config.segmentation * second

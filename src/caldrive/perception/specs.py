@@ -118,9 +118,12 @@ def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = No
     return result
 
 
-def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> Tensor:
-    """The whole loss: those of all affordances added."""
-    return torch.stack(list(losses(outputs, targets, weights).values())).sum()
+def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None, angle_weight: float = 1.0) -> Tensor:
+    """The whole loss: those of all affordances added, the relative angle's times angle_weight."""
+    parts = losses(outputs, targets, weights)
+    if "relative_angle" in parts:
+        parts["relative_angle"] = angle_weight * parts["relative_angle"]
+    return torch.stack(list(parts.values())).sum()
 
 
 def confusion(predicted: Tensor, target: Tensor, n_classes: int) -> Tensor:
