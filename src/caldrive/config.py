@@ -103,9 +103,7 @@ class LateralConfig:
 @dataclass(frozen=True)
 class ControlConfig:
     """The controller. initial_limit: km/h before the first sign. cap: km/h that no limit exceeds, None for no cap.
-
-    blind_brake: brake in [0, 1] where an affordance is not a number.
-    """
+    blind_brake: brake in [0, 1] where an affordance is not a number."""
 
     longitudinal: LongitudinalConfig = LongitudinalConfig()
     lateral: LateralConfig = LateralConfig()
@@ -210,8 +208,8 @@ class TrainingConfig:
     """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
-    angle_weight: what the relative angle's loss counts among the six while the backbone learns; the others count 1.
-    segmentation: weight of the second lesson's loss, where the recording has semantic images; 0 leaves it out.
+    angle_weight, segmentation: what the relative angle's loss and the second lesson's (where the recording has semantic
+    images; 0 leaves it out) count while the backbone learns; the other affordances' count 1.
     block_steps: after the others, steps in which the task blocks that look back learn alone, from block_batch windows
     with their history, whose frames the finished backbone saw once; until then a window is seen as if its stream began
     there. 0: the blocks see their history from the first step on.
@@ -244,7 +242,7 @@ class TrainingConfig:
 
 
 TRAININGS = {
-    "small": TrainingConfig(),
+    "small": TrainingConfig(angle_weight=5.0),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
     "paper": TrainingConfig(
         steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0, block_steps=0
