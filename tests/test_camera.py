@@ -8,10 +8,11 @@ import sys
 import numpy as np
 import pytest
 
-from caldrive.config import CameraConfig
+from caldrive.config import CameraConfig, VehicleConfig
 from caldrive.datatypes import Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved
 from caldrive.world.camera import Camera
+from caldrive.world.labels import IN_VIEW
 from caldrive.world.optics import Lens, mounted
 from caldrive.world.roads import RoadNetwork
 from caldrive.world.scenery import build_scenery
@@ -91,6 +92,17 @@ def test_a_lit_lamp_can_be_read_at_twenty_metres(
     assert len(lit) >= 3
     others = [c for c in range(2) if c != channel]
     assert (lit[:, channel] > lit[:, others].max(axis=1)).mean() > 0.6
+
+
+@pytest.mark.parametrize("state", list(LightState))
+def test_a_lamp_is_whole_in_the_picture_as_near_as_it_counts_and_a_little_nearer(
+    camera: Camera, roads: RoadNetwork, state: LightState
+) -> None:
+    post = roads.posts[0]
+    line, to_axle = roads.lanes[post.lane].line, VehicleConfig().front_axle
+    ego = VehicleState(line.pose_at(line.length - IN_VIEW + 0.3 - to_axle))
+    rows, columns = np.nonzero(difference(shot(camera, ego), shot(camera, ego, lights={post.id: state})) > 60)
+    assert np.ptp(rows) >= np.ptp(columns) - 1 >= 4  # round, not cut off
 
 
 def test_a_light_says_nothing_to_traffic_from_behind(camera: Camera, roads: RoadNetwork) -> None:

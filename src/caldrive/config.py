@@ -218,7 +218,7 @@ class TrainingConfig:
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
     """
 
-    steps: int = 9_000
+    steps: int = 11_000
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3

@@ -13,7 +13,8 @@ from caldrive.world.scenery import Prop
 from caldrive.world.semantics import PROP_CLASSES, Semantic, classed_detail
 from caldrive.world.textures import SIGN_LAYERS, Tex
 
-LAMPS = {"red": 3.16, "yellow": 2.82, "green": 2.48}  # m above the ground
+HEAD = 2.5  # m, the middle of a light's head; low enough for the red lamp to be in view wherever it counts
+LAMPS = {"red": HEAD + 0.34, "yellow": HEAD, "green": HEAD - 0.34}  # m above the ground
 LAMP_RADIUS = 0.155
 LAMP_FACE = -0.2  # m ahead of the post's middle: the side that the traffic sees
 SIGN_HEIGHT, SIGN_RADIUS = 2.1, 0.5
@@ -28,13 +29,13 @@ def _pole(height: float, radius: float, color: RGB = _POLE, n: int = 5) -> Mesh:
 
 def _light_post() -> Detail:
     """The mast, a black plate with a light rim, and three dark lenses; the camera adds the lit one."""
-    mast, grey = _pole(2.3, 0.07, (86, 90, 94), 3), (226, 226, 222)
-    y, z0, z1 = 0.29, 2.21, 3.43
+    mast, grey = _pole(HEAD - 0.52, 0.07, (86, 90, 94), 3), (226, 226, 222)
+    y, z0, z1 = 0.29, HEAD - 0.61, HEAD + 0.61
     face = quads([[(-0.04, y, z0), (-0.04, -y, z0), (-0.04, -y, z1), (-0.04, y, z1)]], _DARK)
-    housing = box((-0.11, 0, 2.82), (0.16, 0.40, 1.08), (26, 27, 29))
+    housing = box((-0.11, 0, HEAD), (0.16, 0.40, 1.08), (26, 27, 29))
     dark = {"red": (74, 22, 22), "yellow": (76, 62, 20), "green": (20, 62, 34)}
     lenses = [disc((LAMP_FACE - 0.005, 0, z), LAMP_RADIUS, 8, dark[name], -1) for name, z in LAMPS.items()]
-    always = (mast, box((0.0, 0, 2.82), (0.05, 0.66, 1.30), grey), face)
+    always = (mast, box((0.0, 0, HEAD), (0.05, 0.66, 1.30), grey), face)
     return Detail(merge(always), merge((housing, *lenses)))
 
 
