@@ -58,6 +58,14 @@ def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) 
     assert [r["step"] for r in rows[1]] == [1, 2, 3, 4, 5, 6]
 
 
+def test_a_killed_run_with_muon_resumes_to_the_same_weights(folder: Path, tmp_path: Path) -> None:
+    config = replace(SHORT, muon=20.0)
+    whole = train(config, folder, tmp_path / "whole", TINY)
+    train(config, folder, tmp_path / "killed", TINY, stop=lambda step: step == 3)
+    assert train(config, folder, tmp_path / "killed", TINY).read_bytes() == whole.read_bytes()
+    assert whole.read_bytes() != train(SHORT, folder, tmp_path / "adam", TINY).read_bytes()
+
+
 def test_a_run_may_begin_with_a_trained_network(folder: Path, tmp_path: Path) -> None:
     first = train(SHORT, folder, tmp_path / "first", TINY)
     still = replace(SHORT, steps=1, learning_rate=0.0, initial=str(first))

@@ -208,6 +208,7 @@ class TrainingConfig:
     """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
+    muon: the backbone's convolutions learn by Muon (`perception/optimizer.py`) at this many times the rate; 0: by Adam.
     angle_weight, segmentation: what the relative angle's loss and the second lesson's (where the recording has semantic
     images; 0 leaves it out) count while the backbone learns; the other affordances' count 1.
     block_steps: after the others, steps in which the task blocks that look back learn alone, from block_batch windows
@@ -222,6 +223,7 @@ class TrainingConfig:
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3
+    muon: float = 0.0
     warm_up: int = 100
     final_rate: float = 0.02
     clip: float = 5.0
@@ -242,7 +244,7 @@ class TrainingConfig:
 
 
 TRAININGS = {
-    "small": TrainingConfig(angle_weight=5.0),
+    "small": TrainingConfig(muon=30.0, angle_weight=5.0),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
     "paper": TrainingConfig(
         steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0, block_steps=0

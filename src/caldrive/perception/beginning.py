@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import torch
-from torch.optim import Adam
 
 from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.calibration import uncalibrated
@@ -14,6 +13,7 @@ from caldrive.perception.checkpoint import CheckpointError, load_network
 from caldrive.perception.dataset import Frames
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, TrainingRun
+from caldrive.perception.optimizer import Optimizer
 from caldrive.perception.sampler import Sampler
 from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.specs import SPECS, class_weights
@@ -61,4 +61,5 @@ def start(
     lessons = Lessons(network, head).to(team.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
     weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    return TrainingRun(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
+    optimizer = Optimizer(lessons, network.backbone.convolutions(), config)
+    return TrainingRun(config, lessons, optimizer, sampler, weights, team)

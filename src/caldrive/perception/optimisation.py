@@ -11,13 +11,13 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
-from torch.optim import Adam
 
 from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.dataset import Batch
 from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.network import Network
+from caldrive.perception.optimizer import Optimizer
 from caldrive.perception.precision import autocast
 from caldrive.perception.repaint import repaint
 from caldrive.perception.sampler import Sampler
@@ -40,6 +40,11 @@ def learning_rate(step: int, config: TrainingConfig) -> float:
 def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
     """Those of a training's settings on which its weights depend once it has begun."""
     return {name: value for name, value in settings.items() if name not in FREE}
+
+
+def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Those whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
 
 
 class Lessons(nn.Module):
@@ -65,7 +70,7 @@ class TrainingRun:
 
     config: TrainingConfig
     lessons: Lessons
-    optimizer: Adam
+    optimizer: Optimizer
     sampler: Sampler
     weights: ClassWeights
     team: Team
@@ -98,8 +103,6 @@ class TrainingRun:
         batch = self.sampler.frames.batch(starts, config.window, self.context, others)
         images = normalise(self._augmented(batch, generator))
         targets = {name: target.to(team.device) for name, target in batch.targets.items()}
-        for group in self.optimizer.param_groups:
-            group["lr"] = learning_rate(self.step, config)
         self.model.train()
         with autocast(config.precision, team.device):
             outputs = self.model(*(x.to(team.device) for x in (images, batch.index, batch.command)))
@@ -107,10 +110,9 @@ class TrainingRun:
         if batch.semantics is not None and "segmentation" in outputs:
             second = segmentation_loss(outputs["segmentation"], batch.semantics, generator)
             total = total + config.segmentation * second
-        self.optimizer.zero_grad(set_to_none=True)
         total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.lessons.parameters(), config.clip)
-        self.optimizer.step()
+        self.optimizer.step(learning_rate(self.step, config))
         self.step += 1
         return float(total.detach())
 
@@ -126,8 +128,7 @@ class TrainingRun:
     def save(self, path: Path) -> None:
         """Write all that the next step depends on."""
         tensors = {f"lessons.{name}": value for name, value in self.lessons.state_dict().items()}
-        for number, state in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
+        tensors |= {f"optimizer.{name}": value for name, value in self.optimizer.state().items()}
         header = {
             "step": self.step, "config": asdict(self.network.config), "training": asdict(self.config),
             "episodes": self.sampler.frames.digest,
@@ -147,7 +148,7 @@ class TrainingRun:
             raise CheckpointError(
                 f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
             )
-        known = {k.removeprefix("lessons."): v for k, v in tensors.items() if k.startswith("lessons.")}
+        known = _under("lessons.", tensors)
         if known.keys() != self.lessons.state_dict().keys():
             raise CheckpointError(
                 f"{path} belongs to a run with other lessons, as on a recording with or without semantic images: "
@@ -155,11 +156,5 @@ class TrainingRun:
             )
         self.lessons.load_state_dict(known)
         self.config = replace(self.config, initial=header["training"]["initial"])
-        states: dict[int, dict[str, Tensor]] = {}
-        for name, value in tensors.items():
-            if name.startswith("optimizer."):
-                _, number, part = name.split(".")
-                states.setdefault(int(number), {})[part] = value
-        groups = self.optimizer.state_dict()["param_groups"]
-        self.optimizer.load_state_dict({"state": states, "param_groups": groups})
+        self.optimizer.restore(_under("optimizer.", tensors))
         self.step = int(header["step"])

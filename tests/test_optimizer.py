@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from caldrive.config import TrainingConfig
+from caldrive.perception.backbone import Backbone
+from caldrive.perception.optimizer import Optimizer
+
+MUON = TrainingConfig(muon=20.0)
+
+
+def _stepped(config: TrainingConfig, scale: float = 1.0, rate: float = 1e-3) -> tuple[Backbone, dict[str, Tensor]]:
+    """A backbone after one step with gradients of this scale, and its weights before."""
+    torch.manual_seed(0)
+    backbone = Backbone(1 / 8, batch_norm=True)
+    before = {name: value.clone() for name, value in backbone.named_parameters()}
+    optimizer = Optimizer(backbone, backbone.convolutions(), config)
+    for parameter in backbone.parameters():
+        parameter.grad = scale * torch.randn_like(parameter)
+    optimizer.step(rate)
+    return backbone, before
+
+
+def test_muon_changes_every_kernel_in_all_directions_at_one_rate() -> None:
+    backbone, before = _stepped(MUON)
+    for name, value in backbone.named_parameters():
+        if value.dim() == 4:
+            changed = (value - before[name]).flatten(1) / (20 * 1e-3)
+            found = torch.linalg.svdvals(changed)
+            assert found.min() > 0.5, name  # Muon's five iterations leave them near one
+            assert found.max() < 1.5, name
+
+
+def test_muon_steps_as_far_on_small_gradients_as_on_large_ones() -> None:
+    large, small = (_stepped(MUON, scale)[0].convolutions()[3].weight for scale in (100.0, 1e-3))
+    torch.testing.assert_close(large, small, atol=1e-3, rtol=0)
+
+
+def test_what_is_no_kernel_learns_by_adam() -> None:
+    backbone, before = _stepped(MUON)
+    other = _stepped(replace(MUON, muon=0.0))[0]
+    for (name, value), same in zip(backbone.named_parameters(), other.parameters(), strict=True):
+        assert torch.equal(value, same) == (value.dim() != 4), name
+    bias = backbone.convolutions()[0].bias
+    assert bias is not None
+    torch.testing.assert_close((bias - before["stages.0.0.bias"]).abs(), torch.full_like(bias, 1e-3), rtol=1e-3, atol=0)
+
+
+def test_a_step_leaves_no_gradient_and_at_rate_zero_no_trace() -> None:
+    backbone, before = _stepped(MUON, rate=0.0)
+    assert all(parameter.grad is None for parameter in backbone.parameters())
+    assert all(torch.equal(value, before[name]) for name, value in backbone.named_parameters())
+
+
+def test_kernels_of_other_memory_are_refused() -> None:
+    conv = nn.Conv2d(4, 8, 3)
+    with pytest.raises(ValueError, match="not in channels-last memory"):
+        Optimizer(conv, [conv], MUON)
