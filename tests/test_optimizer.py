@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from caldrive.config import TrainingConfig
 from caldrive.perception.backbone import Backbone
-from caldrive.perception.optimizer import Optimizer
+from caldrive.perception.optimizer import DECAY, Optimizer
 
 MUON = TrainingConfig(muon=20.0)
 
@@ -29,7 +29,7 @@ def test_muon_changes_every_kernel_in_all_directions_at_one_rate() -> None:
     backbone, before = _stepped(MUON)
     for name, value in backbone.named_parameters():
         if value.dim() == 4:
-            changed = (value - before[name]).flatten(1) / (20 * 1e-3)
+            changed = (value - before[name] * (1 - 20 * 1e-3 * DECAY)).flatten(1) / (20 * 1e-3)
             found = torch.linalg.svdvals(changed)
             assert found.min() > 0.5, name  # Muon's five iterations leave them near one
             assert found.max() < 1.5, name
@@ -38,6 +38,17 @@ def test_muon_changes_every_kernel_in_all_directions_at_one_rate() -> None:
 def test_muon_steps_as_far_on_small_gradients_as_on_large_ones() -> None:
     large, small = (_stepped(MUON, scale)[0].convolutions()[3].weight for scale in (100.0, 1e-3))
     torch.testing.assert_close(large, small, atol=1e-3, rtol=0)
+
+
+def test_kernels_stop_growing_where_the_decay_balances_the_steps() -> None:
+    torch.manual_seed(0)
+    conv = Backbone(1 / 16).convolutions()[3]
+    optimizer, gradient = Optimizer(conv, [conv], MUON), torch.randn_like(conv.weight)
+    for _ in range(100):
+        conv.weight.grad = gradient.clone()
+        optimizer.step(1 / MUON.muon)  # of a length of one
+    found = torch.linalg.svdvals(conv.weight.detach().flatten(1))
+    assert float(found.mean()) == pytest.approx(1 / DECAY, rel=0.3)
 
 
 def test_what_is_no_kernel_learns_by_adam() -> None:

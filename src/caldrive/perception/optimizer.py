@@ -11,6 +11,9 @@ from torch.optim import Adam, Muon
 
 from caldrive.config import TrainingConfig
 
+# Of Muon's rate: without it the kernels grow, so that each step turns them less and their biases count for nothing.
+DECAY = 0.1
+
 
 def _rows(kernel: Tensor) -> Tensor:
     """A convolution's weight or gradient (O, I, h, w) as a matrix (O, h * w * I); a view in channels-last memory."""
@@ -30,7 +33,7 @@ class Optimizer:
         mine = {id(kernel) for kernel in self.kernels}
         self.parts: dict[str, Adam | Muon] = {"adam": Adam([p for p in module.parameters() if id(p) not in mine])}
         if self.matrices:
-            self.parts["muon"] = Muon(self.matrices, weight_decay=0.0)
+            self.parts["muon"] = Muon(self.matrices, weight_decay=DECAY)
 
     def step(self, rate: float) -> None:
         """One step of Adam's at this rate and of Muon's at `config.muon` times it; then the gradients are gone."""
