@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from caldrive.config import BlockConfig, PerceptionConfig, TrainingConfig
 from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Observation, Pose, Scenario
 from caldrive.episodes import EpisodeWriter, Frame
+from caldrive.perception.config import BlockConfig, PerceptionConfig, TrainingConfig
 
 HEIGHT, WIDTH = 32, 64
 SCENARIO = Scenario("town01", weather=1, start=Pose(0, 0, 0), goal=Pose(1, 2, 3), seed=7)

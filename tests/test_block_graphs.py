@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch import nn
 
-from caldrive.config import BlockConfig
 from caldrive.perception.block_graphs import BlockGraphs
+from caldrive.perception.config import BlockConfig
 from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import blocks_in
 from caldrive.perception.specs import SPECS

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import torch
 
-from caldrive.config import BlockConfig
 from caldrive.perception import blocks
 from caldrive.perception.checkpoint import load_network, write_tensors
+from caldrive.perception.config import BlockConfig
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split

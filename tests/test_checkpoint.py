@@ -9,9 +9,9 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from caldrive.config import PERCEPTIONS, PerceptionConfig
 from caldrive.perception import checkpoint
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, save_network, write_tensors
+from caldrive.perception.config import PERCEPTIONS, PerceptionConfig
 from caldrive.perception.network import Network
 from caldrive.perception.specs import describe
 from caldrive.typed import as_type

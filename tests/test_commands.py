@@ -21,11 +21,11 @@ from rich.text import Text
 import caldrive
 from caldrive.cli import _print, main
 from caldrive.commands.answer import Answer
-from caldrive.config import BlockConfig, PerceptionConfig
 from caldrive.datatypes import Command, Observation
 from caldrive.driving.determinism import Digests, compare
 from caldrive.driving.hud import SIZE
 from caldrive.driving.speed import Stopwatch
+from caldrive.perception.config import TRAININGS, BlockConfig, PerceptionConfig, TrainingConfig
 
 DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]
 PREDICTED = ("hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance")
@@ -220,10 +220,8 @@ def test_every_public_name_is_there() -> None:
 def test_what_is_collected_can_be_trained_on_and_the_result_drives(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import caldrive.config
-
-    small = caldrive.config.TrainingConfig(steps=2, batch=2, window=3, block_steps=3, block_batch=8, save_every=1)
-    monkeypatch.setitem(caldrive.config.TRAININGS, "small", small)
+    small = TrainingConfig(steps=2, batch=2, window=3, block_steps=3, block_batch=8, save_every=1)
+    monkeypatch.setitem(TRAININGS, "small", small)
     recording, training = tmp_path / "recording", tmp_path / "training"
     found = run_json(
         *("collect", "--out", str(recording), "--episodes", "2", "--duration", "1", "--workers", "1"),

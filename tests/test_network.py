@@ -8,9 +8,9 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from caldrive.config import PERCEPTIONS, BlockConfig, PerceptionConfig
 from caldrive.perception.backbone import CHANNELS, IMAGENET_LAYERS, Backbone
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
+from caldrive.perception.config import PERCEPTIONS, BlockConfig, PerceptionConfig
 from caldrive.perception.network import Network, NodeGroup, TaskBlock
 from caldrive.perception.specs import SPECS
 from tests.perception_data import TINY

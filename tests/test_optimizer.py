@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from caldrive.config import TrainingConfig
 from caldrive.perception.backbone import Backbone
+from caldrive.perception.config import TrainingConfig
 from caldrive.perception.optimizer import DECAY, Optimizer
 
 MUON = TrainingConfig(muon=20.0)
@@ -69,5 +69,5 @@ def test_a_step_leaves_no_gradient_and_at_rate_zero_no_trace() -> None:
 
 def test_kernels_of_other_memory_are_refused() -> None:
     conv = nn.Conv2d(4, 8, 3)
-    with pytest.raises(ValueError, match="not in channels-last memory"):
+    with pytest.raises(ValueError, match="wanted channels-last"):
         Optimizer(conv, [conv], MUON)

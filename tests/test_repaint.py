@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch import Generator, Tensor
 
-from caldrive.config import TrainingConfig
+from caldrive.perception.config import TrainingConfig
 from caldrive.perception.images import to_float
 from caldrive.perception.repaint import COVERED, FREEDOM, SHADED, Repaint, repaint
 from caldrive.perception.training import train

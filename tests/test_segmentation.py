@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import Generator
 
-from caldrive.config import TrainingConfig
+from caldrive.perception.config import TrainingConfig
 from caldrive.perception.dataset import Frames
 from caldrive.perception.folders import find_episodes
 from caldrive.perception.repaint import FREEDOM

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.checkpoint import read_tensors
+from caldrive.perception.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.team import Team, join
 from caldrive.perception.training import train
 from tests.perception_data import TINY, record

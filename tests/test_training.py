@@ -13,9 +13,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from caldrive.config import TrainingConfig
 from caldrive.perception.beginning import anew
 from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
+from caldrive.perception.config import TrainingConfig
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split

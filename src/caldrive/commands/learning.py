@@ -8,8 +8,9 @@ from pathlib import Path
 import tyro
 
 from caldrive.commands.answer import Answer, Output
-from caldrive.config import PERCEPTIONS, TRAININGS, CollectConfig, TrainingConfig
+from caldrive.config import CollectConfig
 from caldrive.driving.settings import CollectSettings, DataSettings, EvaluateSettings, TrainSettings
+from caldrive.perception.config import PERCEPTIONS, TRAININGS, TrainingConfig
 from caldrive.progress import Progress
 
 

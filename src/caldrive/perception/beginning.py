@@ -7,9 +7,9 @@ from pathlib import Path
 
 import torch
 
-from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.calibration import uncalibrated
 from caldrive.perception.checkpoint import CheckpointError, load_network
+from caldrive.perception.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.dataset import Frames
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import Lessons, TrainingRun

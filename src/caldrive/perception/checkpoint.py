@@ -15,8 +15,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from caldrive.config import PerceptionConfig
 from caldrive.files import write_whole
+from caldrive.perception.config import PerceptionConfig
 from caldrive.perception.network import Network
 from caldrive.perception.specs import describe
 from caldrive.typed import as_type, read_json

@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from caldrive.config import BlockConfig, PerceptionConfig
 from caldrive.datatypes import Command
 from caldrive.perception.backbone import Backbone
+from caldrive.perception.config import BlockConfig, PerceptionConfig
 from caldrive.perception.specs import SPECS, Spec
 
 COMMANDS = tuple(Command)  # a command's number is its place here

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
-from caldrive.config import TrainingConfig
 from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
+from caldrive.perception.config import TrainingConfig
 from caldrive.perception.dataset import Batch
 from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.network import Network

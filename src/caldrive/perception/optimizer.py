@@ -9,9 +9,9 @@ from __future__ import annotations
 from torch import Tensor, nn
 from torch.optim import Adam, Muon
 
-from caldrive.config import TrainingConfig
+from caldrive.perception.config import TrainingConfig
 
-# Of Muon's rate: without it the kernels grow, so that each step turns them less and their biases count for nothing.
+# A share of Muon's rate: without it the kernels grow, and each step turns them less than the one before.
 DECAY = 0.1
 
 
@@ -21,7 +21,8 @@ def _rows(kernel: Tensor) -> Tensor:
 
 
 class Optimizer:
-    """Changes the parameters of a module in place; `convolutions` are those of its kernels that Muon may have."""
+    """Changes the parameters of a module in place. convolutions: those whose kernels Muon may have; config.muon says
+    whether it has them."""
 
     def __init__(self, module: nn.Module, convolutions: list[nn.Conv2d], config: TrainingConfig) -> None:
         self.ratio = config.muon
@@ -29,7 +30,10 @@ class Optimizer:
         self.matrices = [nn.Parameter(_rows(kernel.data)) for kernel in self.kernels]
         for kernel, matrix in zip(self.kernels, self.matrices, strict=True):
             if kernel.data_ptr() != matrix.data_ptr():
-                raise ValueError("found a convolution's weight that is not in channels-last memory")
+                raise ValueError(
+                    "found a kernel in another order of memory, wanted channels-last: "
+                    "type .contiguous(memory_format=torch.channels_last)"
+                )
         mine = {id(kernel) for kernel in self.kernels}
         self.parts: dict[str, Adam | Muon] = {"adam": Adam([p for p in module.parameters() if id(p) not in mine])}
         if self.matrices:
@@ -40,9 +44,10 @@ class Optimizer:
         for kernel, matrix in zip(self.kernels, self.matrices, strict=True):
             matrix.grad = None if kernel.grad is None else _rows(kernel.grad)
             kernel.grad = None
+        rates = {"adam": rate, "muon": rate * self.ratio}
         for name, part in self.parts.items():
             for group in part.param_groups:
-                group["lr"] = rate * self.ratio if name == "muon" else rate
+                group["lr"] = rates[name]
             part.step()
             part.zero_grad(set_to_none=True)
 

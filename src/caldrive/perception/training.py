@@ -9,12 +9,12 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
-from caldrive.config import PerceptionConfig, TrainingConfig
 from caldrive.files import write_whole
 from caldrive.perception.beginning import start
 from caldrive.perception.blocks import feature_table, forget_features, learn_blocks
 from caldrive.perception.calibration import calibrated, input_ranges
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, load_network, round_to_half, save_network
+from caldrive.perception.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.curves import Board, draw_curves
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
