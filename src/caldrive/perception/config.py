@@ -79,7 +79,7 @@ class TrainingConfig:
     auto for a GPU where there is one. initial: file of the network to begin with, None for a new one.
     """
 
-    steps: int = 11_000
+    steps: int = 9_000
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3
@@ -104,7 +104,7 @@ class TrainingConfig:
 
 
 TRAININGS = {
-    "small": TrainingConfig(muon=20.0, angle_weight=5.0),
+    "small": TrainingConfig(muon=20.0, angle_weight=20.0),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
     "paper": TrainingConfig(
         steps=75_000, batch=32, learning_rate=5e-5, warm_up=0, final_rate=1.0, balance=0.0, block_steps=0
