@@ -17,7 +17,9 @@ class Disturbance:
     """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
     that stays as it is, which lets the car turn in too late or keep turning for too long.
 
-    They end before the car has left its lane far behind, where no agent comes and `center_distance` has no words."""
+    They end before the car has left its lane far behind: no agent comes there, and a distance of 2 m is the largest
+    that `center_distance` can tell.
+    """
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng, self.remaining, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
