@@ -37,14 +37,15 @@ class Disturbance:
         return Control(*(float(np.clip(x, low, 1)) for x, low in ((effort, 0), (-effort, 0), (steer, -1))))
 
     def _begin(self, control: Control, speed: float) -> None:
-        self.remaining = self.length = int(self.rng.integers(6, 19))
+        length = int(self.rng.integers(6, 19))
         self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
         self.wheel, self.push = control.steer, 0.0
         if self.rng.random() < 0.6:
-            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2) * min(1.0, SHORT / self.length)
+            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2) * min(1.0, SHORT / length)
             self.push = float(self.rng.choice([-1, 1]) * strength)
         else:
-            self.remaining = self.length = max(1, min(self.length, int(REACH / speed)))
+            length = max(1, min(length, int(REACH / speed)))
+        self.remaining = self.length = length
 
 
 class LateStart:
