@@ -17,8 +17,8 @@ class Disturbance:
     """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
     that stays as it is, which lets the car turn in too late or keep turning for too long.
 
-    They end before the car has left its lane far behind: no agent comes there, and a distance of 2 m is the largest
-    that `center_distance` can tell.
+    They end before the car has left its lane far behind, as a distance of 2 m is the largest that `center_distance`
+    can tell. How to come back from farther away is seen where a car begins there.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:

@@ -91,7 +91,7 @@ class TrainingConfig:
     augment: bool = True
     angle_weight: float = 1.0
     segmentation: float = 0.5
-    block_steps: int = 3_000
+    block_steps: int = 6_000
     block_batch: int = 256
     validation_share: float = 0.05
     evaluate_every: int = 2000
