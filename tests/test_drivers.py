@@ -1,0 +1,29 @@
+"""The agents that commands drive with: the network that ships, where its car was put."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from caldrive.config import ControlConfig
+from caldrive.driving.drivers import network_agent
+from caldrive.driving.tasks import scenarios
+from caldrive.world.embedded import EmbeddedWorld
+
+
+@pytest.mark.parametrize("aside", [-1.0, 1.5, 3.5])
+def test_the_network_that_ships_knows_how_far_aside_it_is_and_comes_back(aside: float) -> None:
+    agent, camera = network_agent(None, ControlConfig(cap=20.0))
+    world = EmbeddedWorld(camera)
+    for scenario in scenarios("town01", "straight", weather=8)[:2]:
+        world.reset(scenario)
+        observation, seen = world.displace(aside, 0.0), []
+        agent.reset()
+        for _ in range(80):
+            control = agent.act(observation)
+            assert agent.decision is not None
+            seen.append(agent.decision.affordances.center_distance)
+            observation = world.step(control)
+        assert np.mean(seen[:5]) == pytest.approx(max(-2.0, -aside), abs=0.3)
+        assert abs(world.truth().affordances.center_distance) < 0.2
+    world.close()
