@@ -20,7 +20,17 @@ from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.traffic import stop_sumo
 
 TINY = CollectConfig(
-    "town02", (1, 6), episodes=3, duration=2.0, cars=6, people=10, tailgating=0.0, width=48, height=24, seed=4
+    "town02",
+    (1, 6),
+    episodes=3,
+    duration=2.0,
+    cars=6,
+    people=10,
+    tailgating=0.4,
+    width=48,
+    height=24,
+    semantic=True,
+    seed=4,
 )
 
 
@@ -99,6 +109,7 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
         ({"duration": math.nan}, "found --duration nan"),
         ({"episodes": 0}, "found --episodes 0"),
         ({"seed": -1}, "found --seed -1"),
+        ({"cars": 400}, "found --cars 400"),
     ],
 )
 def test_what_cannot_be_recorded_is_said_before_anything_is_written(
@@ -109,9 +120,25 @@ def test_what_cannot_be_recorded_is_said_before_anything_is_written(
     assert not (tmp_path / "new").exists()
 
 
+def test_a_recording_is_not_continued_with_other_code(unbroken: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(collection, "code_version", lambda: "another")
+    with pytest.raises(ValueError, match="wanted another: give another --out"):
+        next(collect(replace(TINY, episodes=4), unbroken))
+
+
+def test_a_folder_without_episodes_takes_other_settings(unbroken: Path, tmp_path: Path) -> None:
+    collection._claim(tmp_path, replace(TINY, cars=7))
+    recording = collect(TINY, tmp_path)
+    next(recording)
+    recording.close()  # type: ignore[attr-defined]
+    assert contents(tmp_path).items() <= contents(unbroken).items()
+    assert (tmp_path / "manifest.json").read_bytes() == (unbroken / "manifest.json").read_bytes()
+
+
 @pytest.mark.parametrize("manifest", ["", "[1]", '{"town"'])
 def test_a_damaged_manifest_is_named(tmp_path: Path, manifest: str) -> None:
     (tmp_path / "manifest.json").write_text(manifest)
+    (tmp_path / "episode-00000.parquet").write_bytes(b"")
     with pytest.raises(ValueError, match=r"manifest\.json is damaged"):
         next(collect(TINY, tmp_path))
 

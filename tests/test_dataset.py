@@ -50,6 +50,13 @@ def test_images_from_memory_and_from_jpeg_are_the_same(folder: Path, frames: Fra
     np.testing.assert_array_equal(cached.images(ids), frames.images(ids))
 
 
+def test_the_digest_depends_on_the_images(folder: Path) -> None:
+    episodes = find_episodes(folder)
+    same, brighter = Frames(episodes, SIZE), replace(episodes[0], jpegs=[one + b"0" for one in episodes[0].jpegs])
+    assert Frames(find_episodes(folder), SIZE).digest == same.digest
+    assert Frames([brighter, *episodes[1:]], SIZE).digest != same.digest
+
+
 def test_another_image_size_is_refused(folder: Path) -> None:
     with pytest.raises(EpisodeError, match="64 x 32, the network takes 200 x 88"):
         Frames(find_episodes(folder), (88, 200), cache_gb=1.0)

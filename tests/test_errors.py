@@ -39,6 +39,9 @@ MISTAKES = {
     "sheet of no kind": (["town", "--sheet", "{tmp}/town.jpg"], "wanted a name that ends in .png"),
     "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384"),
     "sheet of too many looks": (["town", "--sheet", "{tmp}/town.png", "--looks", "-1"], "wanted 0 to 100"),
+    "a damaged episode, to learn from": (["train", "--data", "{tmp}/damaged", "--out", "{tmp}"], "record again"),
+    "a damaged episode, to evaluate": (["evaluate", "--data", "{tmp}/damaged"], "record again"),
+    "no episode to learn from": (["train", "--data", "{tmp}/folder.png", "--out", "{tmp}"], "caldrive collect"),
     "no step to learn": (["train", "--steps", "0", "--out", "{tmp}"], "type --steps 1000"),
     "a rate of nothing": (["train", "--rate", "0", "--out", "{tmp}"], "type --rate 0.0004"),
     "a cap below nothing, in a suite": (["benchmark", "--cap", "-5", "--out", "{tmp}"], "type --cap 20"),
@@ -68,6 +71,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with spoilt files, where nothing else may appear."""
     (tmp_path / "broken.xodr").write_text("<OpenDRIVE><road")
     (tmp_path / "empty.xodr").touch()
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "episode-00000.parquet").write_bytes(b"PAR1")
     (tmp_path / "corrupt.safetensors").write_bytes(b"\x08\x00\x00\x00\x00\x00\x00\x00{broken}")
     (tmp_path / "folder.png").mkdir()
     monkeypatch.chdir(tmp_path)
@@ -86,6 +91,19 @@ def test_a_mistake_ends_in_one_sentence(mistake: str, folder: Path, capsys: pyte
     assert said.err.count("\n") == 1
     assert expected in said.err
     assert sorted(folder.rglob("*")) == before
+
+
+def test_a_gpu_that_is_not_there_is_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    assert main(["train", "--data", str(folder), "--out", str(folder), "--device", "cuda"]) == 2
+    assert "type --device cpu" in capsys.readouterr().err
+
+
+def test_damaged_files_are_named_one_by_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["data", str(folder / "damaged"), "--picture", str(folder / "labels.png")]) == 1
+    assert "episode-00000.parquet is damaged" in capsys.readouterr().out.replace("\n", " ")
 
 
 def test_cal_without_a_model_says_what_else_to_type(

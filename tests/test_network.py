@@ -96,6 +96,19 @@ def test_only_the_active_group_receives_gradient(n_samples: int) -> None:
     assert touched == [False, False, True]
 
 
+def test_in_a_mixed_batch_a_group_learns_from_its_own_samples_only() -> None:
+    torch.manual_seed(0)
+    block = TaskBlock(BlockConfig("dense", 6, 0.0, norm="layer"), ANGLE, F).train()
+    features, command = torch.randn(6, 1, F), torch.tensor([0, 2, 0, 2, 2, 0])[:, None]
+    block(features, command).sum().backward()
+    mixed = [p.grad for p in block.groups[0].parameters()]
+    assert all(p.grad is None for p in block.groups[1].parameters())
+    block.zero_grad()
+    block(features[command[:, 0] == 0], command[command[:, 0] == 0]).sum().backward()
+    for found, wanted in zip(mixed, (p.grad for p in block.groups[0].parameters()), strict=True):
+        torch.testing.assert_close(found, wanted)
+
+
 def test_all_six_affordances_come_out_for_each_frame() -> None:
     network = Network(TINY).eval()
     features = network.features(torch.randn(8, 3, 32, 64)).view(2, 4, -1)

@@ -1,19 +1,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from caldrive.datatypes import Image, Observation
+from caldrive.datatypes import Observation
 from caldrive.episode_reader import read_episode
 from caldrive.interfaces import BadImage
 from caldrive.perception.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.dataset import Frames
 from caldrive.perception.images import normalise, to_float
+from caldrive.perception.lessons import Lessons
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Lessons
 from caldrive.perception.predictor import NetworkPerception
 from caldrive.perception.specs import decode
 from tests.perception_data import HEIGHT, TINY, WIDTH, column_image, record, see, values
@@ -74,11 +75,13 @@ def test_bfloat16_is_close(network: Network) -> None:
     ("image", "words"),
     [
         (np.zeros((HEIGHT, WIDTH, 3), np.uint8), "black"),
+        (np.pad(np.full((1, 1, 3), 255, np.uint8), ((9, HEIGHT - 10), (9, WIDTH - 10), (0, 0))), "black"),
+        (None, "the image is None"),
         (np.full((HEIGHT, WIDTH + 8, 3), 90, np.uint8), "set the camera so"),
         (np.full((HEIGHT, WIDTH, 3), 0.5), "of float64"),
     ],
 )
-def test_a_bad_image_is_refused_and_does_not_enter_the_history(network: Network, image: Image, words: str) -> None:
+def test_a_bad_image_is_refused_and_does_not_enter_the_history(network: Network, image: Any, words: str) -> None:
     perception, undisturbed = NetworkPerception(network, "fp32"), NetworkPerception(network, "fp32")
     for place in (0.1, 0.4):
         perception.predict(see(column_image(place)))

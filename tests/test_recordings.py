@@ -43,6 +43,22 @@ def test_a_cut_file_and_a_broken_image_are_named_and_the_rest_is_counted(folder:
     ] * 2
 
 
+def test_episodes_that_were_asked_for_and_are_not_there_are_counted(tmp_path: Path) -> None:
+    record(tmp_path, n_episodes=1, n_frames=11)
+    (tmp_path / "episode0.parquet").rename(tmp_path / "episode-00001.parquet")
+    (tmp_path / "manifest.json").write_text('{"episodes": 5}')
+    found, _ = check_recording(tmp_path)
+    assert (found.episodes, found.missing, found.damaged) == (1, 4, ())
+
+
+@pytest.mark.parametrize("manifest", ["", "[1]", '{"episodes": "five"}'])
+def test_a_damaged_manifest_is_named(folder: Path, manifest: str) -> None:
+    (folder / "manifest.json").write_text(manifest)
+    found, _ = check_recording(folder)
+    assert (found.episodes, found.missing) == (2, 0)
+    assert "manifest.json is damaged" in found.damaged[0]
+
+
 @pytest.mark.parametrize(
     "wrong", [{"image": np.zeros((16, 16, 3), np.uint8)}, {"semantic": np.full((32, 64), 99, np.uint8)}]
 )

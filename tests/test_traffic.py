@@ -15,7 +15,7 @@ from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, 
 from caldrive.geometry import box_corners, boxes_overlap, moved, to_local, wrap_angle
 from caldrive.world.lights import Lights
 from caldrive.world.roads import Lane, RoadNetwork
-from caldrive.world.traffic import Traffic, in_sight, stop_sumo
+from caldrive.world.traffic import Traffic, in_sight, room, stop_sumo
 
 DT = 0.1
 Cars = tuple[VehicleState, ...]
@@ -178,6 +178,11 @@ def test_equal_seeds_give_equal_traffic_and_others_do_not(town02: RoadNetwork, u
 def test_more_cars_than_the_town_holds_are_refused(town02: RoadNetwork) -> None:
     with pytest.raises(ValueError, match=r"found 5000 cars asked for, but town02 has room for \d+"):
         drive(town02, 5000, 0)
+
+
+def test_a_town_holds_as_many_cars_as_it_says_wherever_the_ego_stands(town02: RoadNetwork) -> None:
+    for lane in town02.driveable:
+        assert len(drive(town02, room(town02), 0.1, ego=ego_on(lane, lane.line.length / 2))[0].cars) > 100
 
 
 def test_nobody_starts_on_top_of_the_ego(town02: RoadNetwork) -> None:

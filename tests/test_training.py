@@ -14,16 +14,18 @@ import torch
 from torch import Tensor
 
 from caldrive.perception.beginning import anew
-from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors
-from caldrive.perception.config import TrainingConfig
+from caldrive.perception.checkpoint import CheckpointError, load_network, read_tensors, write_tensors
+from caldrive.perception.config import TRAININGS, TrainingConfig
 from caldrive.perception.dataset import Frames
 from caldrive.perception.evaluation import evaluate
 from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
+from caldrive.perception.lessons import Lessons
 from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Lessons, learning_rate
+from caldrive.perception.optimisation import learning_rate
 from caldrive.perception.precision import use_bf16
+from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.training import train
 from tests.perception_data import HEIGHT, SHORT, TINY, WIDTH, record
 
@@ -64,6 +66,41 @@ def test_a_killed_run_with_muon_resumes_to_the_same_weights(folder: Path, tmp_pa
     train(config, folder, tmp_path / "killed", TINY, stop=lambda step: step == 3)
     assert train(config, folder, tmp_path / "killed", TINY).read_bytes() == whole.read_bytes()
     assert whole.read_bytes() != train(SHORT, folder, tmp_path / "adam", TINY).read_bytes()
+
+
+def test_a_run_is_not_taken_up_by_another_number_of_processes(folder: Path, tmp_path: Path) -> None:
+    train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 3)
+    tensors, header = read_tensors(tmp_path / "state.safetensors")
+    write_tensors(tmp_path / "state.safetensors", tensors, header | {"processes": 4})
+    with pytest.raises(CheckpointError, match="a run of 4 processes, found 1"):
+        train(SHORT, folder, tmp_path, TINY)
+
+
+@pytest.mark.parametrize("segmentation", [False, True])
+def test_frames_in_parts_give_the_gradient_of_all_at_once(segmentation: bool) -> None:
+    torch.manual_seed(0)
+    network = Network(replace(TINY, batch_norm=False))
+    head = Segmentation(network.backbone.channels[STAGE]) if segmentation else None
+    images, index, command = torch.randn(7, 3, HEIGHT, WIDTH), torch.arange(7)[:, None], torch.zeros(7, 1).long()
+    found = []
+    for at_once in (None, 3):
+        lessons = Lessons(network, head, at_once).eval()
+        lessons.zero_grad()
+        sum(output.square().mean() for output in lessons(images, index, command).values()).backward()  # type: ignore[union-attr]
+        found.append([p.grad.clone() for p in lessons.parameters() if p.grad is not None])
+    for whole, parts in zip(*found, strict=True):
+        torch.testing.assert_close(whole, parts, rtol=1e-4, atol=1e-6)
+
+
+def test_the_papers_training_adds_nothing_to_the_papers_lesson(tmp_path: Path) -> None:
+    data = record(tmp_path / "data", semantic=True)
+    paper = replace(
+        TRAININGS["paper"], steps=2, batch=2, window=2, at_once=3, validation_share=0.3, precision="fp32", device="cpu"
+    )
+    path = train(paper, data, tmp_path / "out", replace(TINY, batch_norm=False))
+    state = read_tensors(path.parent / "state.safetensors")[0]
+    assert not any("segmentation" in name for name in state)
+    assert load_network(path)[1].training["others"] == 0.0
 
 
 def test_a_run_may_begin_with_a_trained_network(folder: Path, tmp_path: Path) -> None:

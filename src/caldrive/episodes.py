@@ -26,6 +26,7 @@ from caldrive.scenarios import scenario_values
 
 FORMAT_VERSION = 4
 METADATA_KEY = b"caldrive"
+MANIFEST = "manifest.json"  # of a folder of episodes: what was asked for
 JPEG_QUALITY = 90
 LABELS = tuple(f.name for f in fields(Affordances))
 CONTROLS = tuple(f.name for f in fields(Control))
@@ -48,6 +49,11 @@ SCHEMA = pa.schema(
     ]
 )
 SEMANTIC = pa.field("semantic", pa.binary())  # only in recordings that were asked for it
+
+
+def episode_path(folder: Path, number: int) -> Path:
+    """Where an episode of a folder lies."""
+    return folder / f"episode-{number:05d}.parquet"
 
 
 class EpisodeError(ValueError):

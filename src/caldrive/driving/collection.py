@@ -15,18 +15,17 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.config import CollectConfig
+from caldrive.driving.ledger import code_version
 from caldrive.driving.limits import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.pool import spread
-from caldrive.driving.recorder import episode_path, record_episode
-from caldrive.episodes import FORMAT_VERSION
+from caldrive.driving.recorder import record_episode
+from caldrive.episodes import FORMAT_VERSION, MANIFEST, episode_path
 from caldrive.files import write_whole
 from caldrive.progress import Progress, silent
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.towns import load_town
+from caldrive.world.traffic import room
 from caldrive.world.weather import weather
-
-MANIFEST = "manifest.json"
-
 
 _world: EmbeddedWorld | None = None
 
@@ -42,7 +41,7 @@ def _record(config: CollectConfig, folder: Path, number: int) -> int:
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
     limits = {
-        "episodes": (1, 100_000), "duration": (0.1, 3600.0), "cars": (0, math.inf), "people": (0, math.inf),
+        "episodes": (1, 100_000), "duration": (0.1, 3600.0), "people": (0, math.inf),
         "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS), "seed": (0, MOST_SEED), "rearranged": (0.0, 1.0),
         "workers": (1, MOST_WORKERS),
     }  # fmt: skip
@@ -53,10 +52,15 @@ def _check(config: CollectConfig, workers: int) -> None:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 8 3 1 8 6")
     for number in config.weathers:
         weather(number)
-    load_town(config.town)
+    most = room(load_town(config.town))
+    require_within("--cars", config.cars, 0, most, min(most, usual["cars"]))
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise ValueError(
+            f"found episodes in {path.parent}, but no {path.name} that says how they came: give another --out"
+        )
     try:
         found = json.loads(path.read_text())
     except ValueError:
@@ -67,22 +71,20 @@ def _read_manifest(path: Path) -> dict[str, Any]:
 
 
 def _claim(folder: Path, config: CollectConfig) -> None:
-    """Writes down what is recorded in a folder. Raises ValueError where that is something else already."""
+    """Writes down what is recorded in a folder. Raises ValueError where there are episodes of something else."""
     manifest = folder / MANIFEST
-    wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION}))
-    del wanted["episodes"]  # a recording may grow
-    if manifest.is_file():
-        found = _read_manifest(manifest)
-    elif any(folder.glob("*.parquet")):
-        raise ValueError(f"found episodes in {folder}, but no {MANIFEST} that says how they came: give another --out")
-    else:
-        found = wanted
+    wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION, "code": code_version()}))
+    if any(folder.glob("*.parquet")):
+        _compare(folder, _read_manifest(manifest), wanted)
+    write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
+
+
+def _compare(folder: Path, found: dict[str, Any], wanted: dict[str, Any]) -> None:
     for name, value in wanted.items():
-        if found.get(name) != value:
+        if name != "episodes" and found.get(name) != value:  # a recording may grow
             raise ValueError(
                 f"found in {folder} a recording with {name} {found.get(name)}, wanted {value}: give another --out"
             )
-    write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
 
 
 def collect(

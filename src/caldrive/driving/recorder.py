@@ -17,9 +17,10 @@ from caldrive.driving.distracted import HiddenCars, Tailgater
 from caldrive.driving.disturbance import Disturbance, LateStart
 from caldrive.driving.moments import SEARCH, moments
 from caldrive.driving.starts import starting_place
-from caldrive.episodes import EpisodeWriter, Frame
+from caldrive.episodes import EpisodeWriter, Frame, episode_path
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.route import Route, random_route
+from caldrive.world.traffic import room
 
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 ASIDE, ASKEW = (-1.5, 0.0, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, most often little, and rad
@@ -27,10 +28,6 @@ MAX_YAW = math.radians(15)
 GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
 CAPS = (20.0, 20.0, None)  # km/h, one of them at random, None for the signs alone; tailgaters have the first
 FAST, SLOW = 14, 6  # m/s; no episode is faster in the mean, and no tailgater's
-
-
-def episode_path(folder: Path, number: int) -> Path:
-    return folder / f"episode-{number:05d}.parquet"
 
 
 def record_episode(world: EmbeddedWorld, config: CollectConfig, number: int, folder: Path) -> int:
@@ -106,16 +103,16 @@ def _way(
     route = random_route(roads, start, length, rng, turn)
     scenario = Scenario(
         config.town, config.weathers[number % len(config.weathers)], start, route.line.pose_at(route.length),
-        _cars(config, tailgating, rng), config.people, config.duration, int(rng.integers(2**31)), "collect",
-        config.crossing,
+        _cars(config, tailgating, room(roads), rng), config.people, config.duration, int(rng.integers(2**31)),
+        "collect", config.crossing,
     )  # fmt: skip
     return scenario, route
 
 
-def _cars(config: CollectConfig, tailgating: bool, rng: np.random.Generator) -> int:
-    """How many others drive."""
+def _cars(config: CollectConfig, tailgating: bool, most: int, rng: np.random.Generator) -> int:
+    """How many others drive; most: for how many there is room."""
     if tailgating:
-        return 2 * config.cars
+        return min(2 * config.cars, most)
     return config.cars if rng.random() < 0.5 else config.cars // 3
 
 

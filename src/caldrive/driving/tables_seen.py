@@ -26,7 +26,7 @@ SCALES = {f"{spec.name}/mae": spec.scale for spec in SPECS}
 
 
 def recording_table(found: Recording, picture: Path | None) -> Group:
-    """What a recording holds, and its damaged files."""
+    """What a recording holds, and its damaged files and missing episodes."""
     weathers = ", ".join(f"{n} in weather {weather}" for weather, n in sorted(found.weathers.items(), key=_number))
     shown: list[Table | Text] = [Text(f"{found.episodes} episodes: {weathers or 'none is sound'}")]
     if picture is not None:
@@ -36,7 +36,8 @@ def recording_table(found: Recording, picture: Path | None) -> Group:
                 table.add_row(name.replace("_", " "), value, str(n), f"{100 * n / found.frames:.1f} %")
         shown += [Text(f"{found.frames} frames, {found.minutes:.0f} minutes"), table, Text(f"histograms: {picture}")]
     damaged = [Text(sentence, "red") for sentence in found.damaged] or [Text("no damaged file", "green")]
-    return Group(*shown, *damaged)
+    left = [Text(f"{found.missing} more were asked for: type `caldrive collect` as before", "yellow")]
+    return Group(*shown, *damaged, *(left if found.missing else []))
 
 
 def _number(item: tuple[str, int]) -> int:

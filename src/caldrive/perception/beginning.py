@@ -11,8 +11,9 @@ from caldrive.perception.calibration import uncalibrated
 from caldrive.perception.checkpoint import CheckpointError, load_network
 from caldrive.perception.config import PerceptionConfig, TrainingConfig
 from caldrive.perception.dataset import Frames
+from caldrive.perception.lessons import Lessons
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import Lessons, TrainingRun
+from caldrive.perception.optimisation import TrainingRun
 from caldrive.perception.optimizer import Optimizer
 from caldrive.perception.sampler import Sampler
 from caldrive.perception.segmentation import STAGE, Segmentation
@@ -58,7 +59,7 @@ def start(
     head = None
     if config.segmentation and frames.has_semantics:
         head = Segmentation(network.backbone.channels[STAGE])
-    lessons = Lessons(network, head).to(team.device)
+    lessons = Lessons(network, head, config.at_once).to(team.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
     weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
     optimizer = Optimizer(lessons, network.backbone.convolutions(), config)

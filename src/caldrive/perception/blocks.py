@@ -106,5 +106,5 @@ def _lesson(run: TrainingRun, features: Tensor, number: int) -> tuple[Tensor, Te
     """The features (B, T, F), commands (B, S) and targets (B * S,) of a step of the whole training."""
     sampler, window, batch = run.sampler, run.config.window, run.config.block_batch
     ids = sampler.frames.windows(sampler.draw(number, batch), window, run.network.span - 1)
-    command, targets = sampler.frames.lessons(ids[:, -window:], sampler.others(number, batch))
+    command, targets = sampler.frames.lessons(ids[:, -window:], sampler.others(number, batch, run.config.others))
     return features[torch.from_numpy(ids)].float(), command, targets

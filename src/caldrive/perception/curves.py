@@ -18,18 +18,24 @@ SMOOTH = 50  # steps that the loss is averaged over
 class Board:
     """A run's figures for TensorBoard, where it is installed; elsewhere nothing happens."""
 
-    def __init__(self, folder: Path, on: bool = True) -> None:
+    def __init__(self, folder: Path, on: bool = True, step: int = 0) -> None:
+        """step: the last one that is done; what is there of later ones is drawn no more."""
         self._writer: Any = None
         if on and find_spec("tensorboard") is not None:
             from torch.utils.tensorboard import SummaryWriter
 
-            self._writer = SummaryWriter(str(folder))
+            self._writer = SummaryWriter(str(folder), purge_step=step + 1)
 
     def add(self, row: Mapping[str, float]) -> None:
         """One step's row of the metrics."""
         if self._writer is not None:
             for name in row.keys() - {"step"}:
                 self._writer.add_scalar(name, row[name], int(row["step"]))
+
+    def close(self) -> None:
+        """Write what is not written yet."""
+        if self._writer is not None:
+            self._writer.close()
 
 
 def draw_curves(rows: Sequence[Mapping[str, float]], path: Path) -> None:

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,10 +74,12 @@ class Frames:
     def __len__(self) -> int:
         return len(self._where)
 
-    @property
+    @cached_property
     def digest(self) -> str:
-        """Tells these episodes and their labels from others."""
+        """Tells these episodes, their labels and images from others; other images have JPEGs of other lengths."""
         found = hashlib.sha256(repr([(e.key, len(e)) for e in self.episodes]).encode())
+        for blobs in (one for e in self.episodes for one in (e.jpegs, e.semantics or ())):
+            found.update(np.array([len(blob) for blob in blobs]).tobytes())
         for values in (self.command, self.other_command, *self.targets.values(), *self.other_targets.values()):
             found.update(np.asarray(values).tobytes())
         return found.hexdigest()[:16]

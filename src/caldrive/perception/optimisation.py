@@ -16,12 +16,13 @@ from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_
 from caldrive.perception.config import TrainingConfig
 from caldrive.perception.dataset import Batch
 from caldrive.perception.images import augment, normalise, to_float
+from caldrive.perception.lessons import Lessons
 from caldrive.perception.network import Network
 from caldrive.perception.optimizer import Optimizer
 from caldrive.perception.precision import autocast
 from caldrive.perception.repaint import repaint
 from caldrive.perception.sampler import Sampler
-from caldrive.perception.segmentation import STAGE, Segmentation, segmentation_loss
+from caldrive.perception.segmentation import segmentation_loss
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
 
@@ -45,23 +46,6 @@ def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
 def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
     """Those whose names begin with a prefix, without it."""
     return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
-
-
-class Lessons(nn.Module):
-    """The network and its second lesson as one call, which is what DistributedDataParallel looks after."""
-
-    def __init__(self, network: Network, segmentation: Segmentation | None = None) -> None:
-        super().__init__()
-        self.network, self.segmentation = network, segmentation
-
-    def forward(self, images: Tensor, index: Tensor, command: Tensor) -> dict[str, Tensor]:
-        """Normalised images (N, 3, H, W), and where windows find theirs among them (B, T), to outputs (B * S, K); each
-        image passes the backbone once. Under `segmentation` are the logits of that lesson."""
-        maps = self.network.backbone.maps(images)
-        outputs: dict[str, Tensor] = self.network(maps[-1].flatten(1)[index], command)
-        if self.segmentation is not None:
-            outputs["segmentation"] = self.segmentation(maps[STAGE])
-        return outputs
 
 
 @dataclass
@@ -99,7 +83,7 @@ class TrainingRun:
         torch.manual_seed(seed)  # dropout
         mine = slice(team.rank, None, team.size)
         starts = self.sampler.draw(self.step, config.batch)[mine]
-        others = self.sampler.others(self.step, config.batch)[mine]
+        others = self.sampler.others(self.step, config.batch, config.others)[mine]
         batch = self.sampler.frames.batch(starts, config.window, self.context, others)
         images = normalise(self._augmented(batch, generator))
         targets = {name: target.to(team.device) for name, target in batch.targets.items()}
@@ -121,7 +105,7 @@ class TrainingRun:
         images = to_float(batch.images)
         if not self.config.augment:
             return images
-        if batch.semantics is not None:
+        if self.config.repaint and batch.semantics is not None:
             images = repaint(images, batch.semantics, batch.group, generator)
         return augment(images, generator, batch.group)
 
@@ -131,7 +115,7 @@ class TrainingRun:
         tensors |= {f"optimizer.{name}": value for name, value in self.optimizer.state().items()}
         header = {
             "step": self.step, "config": asdict(self.network.config), "training": asdict(self.config),
-            "episodes": self.sampler.frames.digest,
+            "episodes": self.sampler.frames.digest, "processes": self.team.size,
         }  # fmt: skip
         write_tensors(path, tensors, {"kind": "training"} | header)
 
@@ -144,15 +128,19 @@ class TrainingRun:
                 raise CheckpointError(
                     f"{path} belongs to a run with {name} {found.get(name)}, wanted {wanted}: give another --out"
                 )
-        if header.get("episodes") != self.sampler.frames.digest:
-            raise CheckpointError(
-                f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
-            )
         known = _under("lessons.", tensors)
         if known.keys() != self.lessons.state_dict().keys():
             raise CheckpointError(
                 f"{path} belongs to a run with other lessons, as on a recording with or without semantic images: "
                 "give the same --data or another --out"
+            )
+        if header.get("episodes") != self.sampler.frames.digest:
+            raise CheckpointError(
+                f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
+            )
+        if header.get("processes") != self.team.size:
+            raise CheckpointError(
+                f"{path} belongs to a run of {header.get('processes')} processes, found {self.team.size}: start as many"
             )
         self.lessons.load_state_dict(known)
         self.config = replace(self.config, initial=header["training"]["initial"])

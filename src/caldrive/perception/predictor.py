@@ -16,7 +16,7 @@ from caldrive.perception.network import COMMANDS, Network
 from caldrive.perception.precision import INTEGERS, blocks_in, driving_precision, features_in
 from caldrive.perception.specs import decode
 
-DARK = 3  # the brightest pixel of a working camera's image is brighter than this, even by night
+DARK, LIT = 3, 0.01  # of a working camera's image at least this share is brighter than that, even by night
 
 
 class NetworkPerception:
@@ -60,9 +60,11 @@ class NetworkPerception:
     def _check(self, image: Image) -> None:
         config = self.network.config
         wanted = (config.image_height, config.image_width, 3)
+        if not isinstance(image, np.ndarray):
+            raise BadImage(f"the image is {image}, the network takes {wanted} of uint8: brake, and look at the camera")
         if image.shape != wanted or image.dtype != np.uint8:
             raise BadImage(
                 f"the image is {image.shape} of {image.dtype}, the network takes {wanted} of uint8: set the camera so"
             )
-        if image.max() <= DARK:
+        if np.count_nonzero(image > DARK) < LIT * image.size:
             raise BadImage("the image is black: brake, and look at the camera")

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from caldrive.episode_reader import Episode, read_episode
-from caldrive.episodes import EpisodeError
+from caldrive.episodes import MANIFEST, EpisodeError, episode_path
 from caldrive.files import write_figure
 from caldrive.perception.folders import class_counts, episode_paths, joined
 from caldrive.perception.repaint import FREEDOM
 from caldrive.progress import Progress, silent
+from caldrive.typed import read_json
+
+T = TypeVar("T")
 
 HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
     "vehicle_distance": (np.linspace(0, 50, 26), "m"),
@@ -26,7 +31,7 @@ HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
 @dataclass(frozen=True)
 class Recording:
     """What lies in a folder. minutes: simulated; weathers: episodes by weather; counts: frames by label and value;
-    damaged: a sentence for each file that is no use."""
+    damaged: a sentence for each file that is no use; missing: episodes that were asked for and are not there."""
 
     episodes: int
     frames: int
@@ -34,6 +39,7 @@ class Recording:
     weathers: dict[str, int]
     counts: dict[str, dict[str, int]]
     damaged: tuple[str, ...]
+    missing: int = 0
 
 
 def check_episode(path: Path) -> Episode:
@@ -48,23 +54,41 @@ def check_episode(path: Path) -> Episode:
     return replace(episode, semantics=None)
 
 
+def _missing(manifest: Path) -> int:
+    """How many of the episodes that `caldrive collect` was asked for are not in its folder. Raises EpisodeError where
+    nobody can read what was asked for."""
+    try:
+        asked = read_json(manifest.read_bytes(), dict[str, Any]).get("episodes", 0)
+        return sum(not episode_path(manifest.parent, k).is_file() for k in range(asked))
+    except (ValueError, TypeError) as error:
+        raise EpisodeError(f"{manifest} is damaged ({error}): record in another folder") from error
+
+
+def _tried(check: Callable[[Path], T], paths: list[Path], progress: Progress = silent) -> tuple[list[T], list[str]]:
+    """What a check makes of the files that are sound, and a sentence for each of the others."""
+    sound, damaged = [], []
+    for k, path in enumerate(paths):
+        progress("checking", k / len(paths))
+        try:
+            sound.append(check(path))
+        except EpisodeError as error:
+            damaged.append(str(error))
+    return sound, damaged
+
+
 def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recording, list[Episode]]:
     """Reads all episodes of a folder; returns what they hold, and those that are sound.
 
     Raises EpisodeError where there is no episode at all.
     """
-    paths = episode_paths(folder)
-    sound, damaged = [], []
-    for k, path in enumerate(paths):
-        progress("checking", k / len(paths))
-        try:
-            sound.append(check_episode(path))
-        except EpisodeError as error:
-            damaged.append(str(error))
+    sound, damaged = _tried(check_episode, episode_paths(folder), progress)
+    missing, unknown = _tried(_missing, sorted(folder.glob(f"**/{MANIFEST}")))
     minutes = sum(float(np.ptp(e.columns["time"])) for e in sound) / 60
     weathers = Counter(str(e.scenario.weather) for e in sound)
     counts = class_counts(sound) if sound else {}
-    return Recording(len(sound), sum(map(len, sound)), minutes, dict(weathers), counts, tuple(damaged)), sound
+    return Recording(
+        len(sound), sum(map(len, sound)), minutes, dict(weathers), counts, (*damaged, *unknown), sum(missing)
+    ), sound
 
 
 def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], path: Path) -> None:

@@ -19,7 +19,6 @@ SIZES = {
     "clean_steer": (0.05, 0.15, 0.4),
 }
 WAITING = 0.25  # weight of a frame in which the car stands and has to: it looks like the one before
-OTHERS = 0.5  # share of the windows that are seen with another command, if one could be given
 
 
 def rarity(frames: Frames, balance: float) -> NDArray[np.float64]:
@@ -60,9 +59,9 @@ class Sampler:
         chosen: Ids = self.starts[np.searchsorted(self._cumulative, chance, side="right")]
         return chosen
 
-    def others(self, step: int, n: int) -> NDArray[np.bool_]:
-        """Which of n windows are seen with another command, if one could be given."""
-        return np.random.default_rng((self.seed, step, 1)).random(n) < OTHERS
+    def others(self, step: int, n: int, share: float) -> NDArray[np.bool_]:
+        """Which of n windows, a share of them, are seen with another command, if one could be given."""
+        return np.random.default_rng((self.seed, step, 1)).random(n) < share
 
     def class_counts(self) -> dict[str, NDArray[np.float64]]:
         """How many samples of each class the drawn windows hold, by affordance, in expectation and scaled to the data's

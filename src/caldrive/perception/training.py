@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
@@ -83,7 +84,9 @@ def train(
     progress = progress if team.leads else silent
     size = (perception.image_height, perception.image_width)
     train_episodes, held_episodes = split(
-        find_episodes(data, semantic=config.augment or config.segmentation > 0), config.validation_share, config.seed
+        find_episodes(data, semantic=config.segmentation > 0 or (config.augment and config.repaint)),
+        config.validation_share,
+        config.seed,
     )
     frames, held = Frames(train_episodes, size, config.cache_gb), Frames(held_episodes, size)
     known = begun(out)  # then what the run began with is needed no more
@@ -91,13 +94,14 @@ def train(
     if known:
         run.restore(out / STATE)
     team.wait()
-    rows, board = kept_rows(out / METRICS, run.step), Board(out / "tensorboard", team.leads)
-    while run.step < config.steps and not stop(run.step):
-        rows.append(_step(run, held, out, rows))
-        board.add(rows[-1])
-        progress(f"training, step {run.step}, loss {rows[-1]['loss']:.3f}", run.step / config.steps)
-    if run.step == config.steps and _looks_back(run) and team.leads and not stop(run.step):
-        _finish(run, held, out, rows, board, progress)
+    rows = kept_rows(out / METRICS, run.step)
+    with closing(Board(out / "tensorboard", team.leads, run.step)) as board:
+        while run.step < config.steps and not stop(run.step):
+            rows.append(_step(run, held, out, rows))
+            board.add(rows[-1])
+            progress(f"training, step {run.step}, loss {rows[-1]['loss']:.3f}", run.step / config.steps)
+        if run.step == config.steps and _looks_back(run) and team.leads and not stop(run.step):
+            _finish(run, held, out, rows, board, progress)
     return out / MODEL
 
 

@@ -28,6 +28,19 @@ MODELS = (("compact", 4.2, 1.76), ("estate", 4.6, 1.8), ("van", 4.9, 1.95))  # n
 _LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
 
 
+def places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
+    """Where in a town a car may stand at the start: on which lane, and how far along it (m)."""
+    return [(lane, float(s)) for lane in roads.driveable for s in np.arange(SPACING, lane.line.length - 2.0, SPACING)]
+
+
+def room(roads: RoadNetwork) -> int:
+    """How many cars a town holds, wherever the ego stands."""
+    here = np.array([(pose.x, pose.y) for pose in (lane.line.pose_at(s) for lane, s in places(roads))]).reshape(-1, 2)
+    apart = np.linalg.norm(here[:, None] - here[None], axis=-1)
+    near = (apart <= CLEAR_OF_EGO + SPACING / 2).sum(axis=1)  # the ego may stand between two places
+    return len(here) - int(near.max(initial=0))
+
+
 class Traffic:
     """One SUMO simulation; there can be one in a process. Raises ValueError for more cars than the town holds.
 
@@ -64,11 +77,10 @@ class Traffic:
     def _places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
         """Random free places for n cars, away from the ego."""
         free = []
-        for lane in self.roads.driveable:
-            for s in np.arange(SPACING, lane.line.length - 2.0, SPACING):
-                here = lane.line.pose_at(float(s))
-                if math.hypot(here.x - ego.pose.x, here.y - ego.pose.y) > CLEAR_OF_EGO:
-                    free.append((lane, float(s)))
+        for lane, s in places(self.roads):
+            here = lane.line.pose_at(s)
+            if math.hypot(here.x - ego.pose.x, here.y - ego.pose.y) > CLEAR_OF_EGO:
+                free.append((lane, s))
         if n > len(free):
             raise ValueError(
                 f"found {n} cars asked for, but {self.roads.name} has room for {len(free)}: ask for fewer with --cars"
