@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from caldrive.config import ControlConfig
-from caldrive.driving.drivers import network_agent
+from caldrive.driving.drivers import SHIPPED_MODEL, network_agent
 from caldrive.driving.tasks import scenarios
 from caldrive.world.embedded import EmbeddedWorld
+
+
+def test_the_network_that_ships_is_small() -> None:
+    assert SHIPPED_MODEL.stat().st_size < 10e6
 
 
 @pytest.mark.parametrize("aside", [-1.0, 1.5, 3.5])
