@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from caldrive.cli import main
+from caldrive.files import write_whole
 
 DRIVE = ["drive", "--agent", "oracle", "--seconds", "1"]
 MISTAKES = {
@@ -125,8 +126,18 @@ def test_a_full_disk_is_named_in_words(monkeypatch: pytest.MonkeyPatch, capsys: 
     monkeypatch.setattr("caldrive.driving.drive.drive", fail)
     assert main(DRIVE) == 2
     assert capsys.readouterr().err == (
-        "caldrive: found that out/drive.mp4 is no use (no space left on device), wanted one that is: give another\n"
+        "caldrive: found no room on the disk for out/drive.mp4, wanted some: make room, and type it again\n"
     )
+
+
+def test_a_file_that_finds_no_room_is_named_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("caldrive.files.os.fsync", fail)
+    with pytest.raises(OSError, match=r"No space left on device: '.*labels\.png'"):
+        write_whole(tmp_path / "labels.png", b"content")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_ctrl_c_ends_in_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

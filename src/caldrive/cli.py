@@ -5,6 +5,7 @@ Exit codes: 0 for success, 1 where a check that was asked for says no, 2 for an 
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -19,6 +20,7 @@ from caldrive.commands import Answer, Command
 from caldrive.progress import Progress, silent
 
 DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
+FULL = (errno.ENOSPC, errno.EDQUOT)
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None
 
 
@@ -61,6 +63,8 @@ def _first_message(box: str) -> str:
 
 def _sentence(error: Exception) -> str:
     """An error in one line."""
+    if isinstance(error, OSError) and error.errno in FULL:
+        return f"found no room on the disk for {error.filename or 'a file'}, wanted some: make room, and type it again"
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"found that {error.filename} is no use ({error.strerror.lower()}), wanted one that is: give another"
     return " ".join(str(error).split()) or type(error).__name__
