@@ -83,7 +83,7 @@ class TrainingConfig:
     to begin with, None for a new one.
     """
 
-    steps: int = 9_000
+    steps: int = 8_000
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3
