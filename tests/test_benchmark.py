@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from caldrive.datatypes import Pose
 from caldrive.driving import benchmark as runner
 from caldrive.driving import ledger, worker
 from caldrive.driving.benchmark import benchmark, read_results
@@ -109,6 +110,27 @@ def test_results_that_nothing_says_whose_they_are_are_refused(whole: BenchmarkSe
 def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
     with ledger.held(tmp_path), pytest.raises(ValueError, match="another benchmark at work"):
         next(benchmark(replace(whole, out=tmp_path)))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"weather": 99}, "found weather 99"),
+        ({"town": "town09"}, "found town 'town09'"),
+        ({"start": Pose(-900, 0, 0)}, "found no lane"),
+        ({"n_vehicles": 900}, "n_vehicles is 900, but town"),
+        ({"n_pedestrians": 90_000}, "n_pedestrians is 90000, but town"),
+    ],
+)
+def test_a_trial_that_cannot_be_is_named_before_there_is_a_folder(
+    change: dict[str, Any], said: str, whole: BenchmarkSettings, tmp_path: Path
+) -> None:
+    first, last = suite(whole.suite)[:2]
+    trials = [first, replace(last, scenario=replace(last.scenario, **change))]
+    (tmp_path / "own.json").write_text(to_json(trials))
+    with pytest.raises(ValueError, match=f"{last.key} in .* is nowhere .{said}"):
+        next(benchmark(replace(whole, suite=str(tmp_path / "own.json"), out=tmp_path / "out")))
+    assert not (tmp_path / "out").exists()
 
 
 def test_results_of_another_episode_of_the_same_name_are_refused(whole: BenchmarkSettings) -> None:

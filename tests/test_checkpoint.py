@@ -75,7 +75,9 @@ def test_weights_of_another_network_are_refused(network: Network, tmp_path: Path
 
 HEADERS: list[dict[str, Any]] = [
     {"config": asdict(TINY) | {"wings": 2}}, {"config": {"red_light": {"wings": 2}}}, {"metrics": {"loss": "low"}},
-    {"seed": None}, {"ranges": 3},
+    {"seed": None}, {"ranges": 3}, {"config": asdict(TINY) | {"width": 1e30}}, {"config": {"image_width": 0}},
+    {"config": {"red_light": {"length": 0}}}, {"config": {"red_light": {"dilation": -1}}},
+    {"data": {"train_classes": 3}}, {"data": {"validation_episodes": 3}}, {"data": {"wings": 2}},
 ]  # fmt: skip
 
 
@@ -108,6 +110,28 @@ def test_weights_that_are_not_numbers_are_refused(network: Network, tmp_path: Pa
     next(iter(network.blocks.parameters())).data[0] = float("nan")
     save_network(tmp_path / "model.safetensors", network, INFO)
     with pytest.raises(CheckpointError, match="not numbers"):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_variances_below_nothing_are_refused(tmp_path: Path) -> None:
+    network = Network(PERCEPTIONS["small"])
+    network.get_buffer("backbone.norms.0.running_var")[0] = -1.0
+    save_network(tmp_path / "model.safetensors", network, CheckpointInfo(network.config))
+    with pytest.raises(CheckpointError, match="variances less than 0"):
+        load_network(tmp_path / "model.safetensors")
+
+
+@pytest.mark.parametrize("classes", [{"red_light": [1, 2, 3]}, {"wings": [1, 2]}, {"red_light": [0, 0]}], ids=str)
+def test_counts_of_other_classes_are_refused(classes: dict[str, Any], network: Network, tmp_path: Path) -> None:
+    save_network(tmp_path / "model.safetensors", network, replace(INFO, data={"train_classes": classes}))
+    with pytest.raises(CheckpointError, match="counts of other classes"):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_a_header_of_nothing_is_foreign(tmp_path: Path) -> None:
+    text = b'{"__metadata__":null}  '
+    (tmp_path / "model.safetensors").write_bytes(len(text).to_bytes(8, "little") + text)
+    with pytest.raises(CheckpointError, match=r"no network of caldrive|damaged"):
         load_network(tmp_path / "model.safetensors")
 
 

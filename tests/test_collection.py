@@ -110,6 +110,7 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
         ({"episodes": 0}, "found --episodes 0"),
         ({"seed": -1}, "found --seed -1"),
         ({"cars": 400}, "found --cars 400"),
+        ({"people": 40_000}, "found --people 40000"),
     ],
 )
 def test_what_cannot_be_recorded_is_said_before_anything_is_written(
@@ -124,6 +125,12 @@ def test_a_recording_is_not_continued_with_other_code(unbroken: Path, monkeypatc
     monkeypatch.setattr(collection, "code_version", lambda: "another")
     with pytest.raises(ValueError, match="wanted another: give another --out"):
         next(collect(replace(TINY, episodes=4), unbroken))
+
+
+def test_fewer_episodes_than_before_are_no_smaller_recording(unbroken: Path) -> None:
+    before = contents(unbroken)
+    assert not list(collect(replace(TINY, episodes=1), unbroken))
+    assert contents(unbroken) == before
 
 
 def test_a_folder_without_episodes_takes_other_settings(unbroken: Path, tmp_path: Path) -> None:

@@ -110,7 +110,17 @@ def test_missing_damaged_and_foreign_files_are_told_apart(path: Path, tmp_path: 
 
 @pytest.mark.parametrize(
     ("column", "value"),
-    [("hazard_stop", 1.5), ("vehicle_distance", -1.0), ("speed_sign", 45), ("relative_angle", 4.0), ("time", math.inf)],
+    [
+        ("hazard_stop", 1.5),
+        ("hazard_stop", 0.5),
+        ("vehicle_distance", -1.0),
+        ("speed_sign", 45),
+        ("relative_angle", 4.0),
+        ("center_distance", 1e300),
+        ("time", math.inf),
+        ("speed", -1e300),
+        ("frame", 0),
+    ],
 )
 def test_labels_that_cannot_be_are_named(column: str, value: float, path: Path) -> None:
     table = pq.read_table(path)
@@ -130,6 +140,15 @@ def test_another_version_is_refused(path: Path) -> None:
     }
     pq.write_table(table.replace_schema_metadata(metadata), path)
     with pytest.raises(EpisodeError, match="format 99"):
+        read_episode(path)
+
+
+def test_a_bit_that_turned_over_in_an_image_is_found(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    image = read_episode(path).jpegs[1]
+    content[content.index(image) + len(image) - 20] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(EpisodeError, match="is damaged"):
         read_episode(path)
 
 

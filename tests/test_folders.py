@@ -7,7 +7,7 @@ import pytest
 
 from caldrive.episodes import EpisodeError, EpisodeWriter
 from caldrive.perception.folders import class_counts, find_episodes, held_out, split
-from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame
+from tests.perception_data import HEIGHT, SCENARIO, WIDTH, make_frame, record
 
 SIZE = (HEIGHT, WIDTH)
 
@@ -24,6 +24,13 @@ def test_one_episode_is_too_few(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(EpisodeError, match="one each"):
         split(find_episodes(folder)[:1], 0.05, seed=0)
     with pytest.raises(EpisodeError, match="there is no episode"):
+        find_episodes(tmp_path)
+
+
+def test_an_episode_that_is_there_again_is_refused(tmp_path: Path) -> None:
+    record(tmp_path, n_episodes=2, n_frames=3)
+    (tmp_path / "again.parquet").write_bytes((tmp_path / "episode1.parquet").read_bytes())
+    with pytest.raises(EpisodeError, match=r"again: remove one"):
         find_episodes(tmp_path)
 
 

@@ -51,7 +51,7 @@ def test_episodes_that_were_asked_for_and_are_not_there_are_counted(tmp_path: Pa
     assert (found.episodes, found.missing, found.damaged) == (1, 4, ())
 
 
-@pytest.mark.parametrize("manifest", ["", "[1]", '{"episodes": "five"}'])
+@pytest.mark.parametrize("manifest", ["", "[1]", '{"episodes": "five"}', '{"episodes": -1}'])
 def test_a_damaged_manifest_is_named(folder: Path, manifest: str) -> None:
     (folder / "manifest.json").write_text(manifest)
     found, _ = check_recording(folder)
@@ -70,6 +70,21 @@ def test_images_that_are_none_of_the_recorders_are_named(wrong: dict[str, Any], 
     found, episodes = check_recording(tmp_path)
     assert not episodes
     assert "row 1 of" in found.damaged[0]
+
+
+def test_an_episode_that_is_there_again_is_named(folder: Path) -> None:
+    (folder / "again.parquet").write_bytes((folder / "episode1.parquet").read_bytes())
+    found, _ = check_recording(folder)
+    assert len(found.damaged) == 1
+    assert "episode1.parquet is the episode of" in found.damaged[0]
+
+
+def test_an_episode_of_another_size_is_named(tmp_path: Path) -> None:
+    for name, image in {"a": np.zeros((32, 64, 3), np.uint8), "b": np.zeros((16, 64, 3), np.uint8)}.items():
+        with EpisodeWriter(tmp_path / f"{name}.parquet", SCENARIO) as writer:
+            writer.append(replace(make_frame(0), image=image))
+    found, _ = check_recording(tmp_path)
+    assert [sentence.partition(" has ")[2][:17] for sentence in found.damaged] == ["images of 64 x 16"]
 
 
 def test_an_empty_folder_says_what_to_type(tmp_path: Path) -> None:

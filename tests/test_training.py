@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 from signal import SIGKILL
+from typing import Any
 
 import pytest
 import torch
@@ -27,7 +28,7 @@ from caldrive.perception.optimisation import learning_rate
 from caldrive.perception.precision import use_bf16
 from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.training import train
-from tests.perception_data import HEIGHT, SHORT, TINY, WIDTH, record
+from tests.perception_data import BLOCKS, HEIGHT, SHORT, TINY, WIDTH, record
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -178,9 +179,36 @@ def test_a_state_of_other_episodes_is_not_taken_up(folder: Path, tmp_path: Path)
         train(SHORT, tmp_path / "more", tmp_path / "out", TINY)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"step": -1}, "is damaged"),
+        ({"step": 7}, "is damaged"),
+        ({"step": None}, "is damaged"),
+        ({"training": 3}, "is damaged"),
+        ({"kind": "network"}, "no training's state, but a network"),
+    ],
+    ids=str,
+)
+def test_a_damaged_state_is_not_taken_up(change: dict[str, Any], said: str, folder: Path, tmp_path: Path) -> None:
+    train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 2)
+    tensors, header = read_tensors(tmp_path / "state.safetensors")
+    write_tensors(tmp_path / "state.safetensors", tensors, header | change)
+    with pytest.raises(CheckpointError, match=said):
+        train(SHORT, folder, tmp_path, TINY)
+
+
+@pytest.mark.parametrize("config", [SHORT, BLOCKS], ids=["all", "blocks"])
+def test_a_network_that_was_removed_comes_again(config: TrainingConfig, folder: Path, tmp_path: Path) -> None:
+    model = train(config, folder, tmp_path, TINY)
+    whole = model.read_bytes()
+    model.unlink()
+    assert train(config, folder, tmp_path, TINY).read_bytes() == whole
+
+
 def test_damaged_metrics_are_named(folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 2)
-    for content in ("{", "[]", '{"loss": 1}', '{"step": "a"}'):
+    for content in ("{", "[]", '{"loss": 1}', '{"step": 1}', '{"step": "a"}'):
         (tmp_path / "metrics.jsonl").write_text(content + "\n")
         with pytest.raises(CheckpointError, match=r"metrics\.jsonl is damaged"):
             train(SHORT, folder, tmp_path, TINY)

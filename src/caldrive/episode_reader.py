@@ -39,11 +39,11 @@ from caldrive.episodes import (
 from caldrive.scenarios import scenario_from_values
 from caldrive.typed import read_json
 
-SHARE, HALF_TURN = (0.0, 1.0), (-math.pi, math.pi)
+SHARE, HALF_TURN, METRES = (0.0, 1.0), (-math.pi, math.pi), (-1000.0, 1000.0)
 RANGES = {  # of what a recorder can write
-    "hazard_stop": SHARE, "red_light": SHARE, "vehicle_distance": (0.0, MAX_VEHICLE_DISTANCE),
-    "relative_angle": HALF_TURN, "other_relative_angle": HALF_TURN,
-    "camera_yaw": HALF_TURN, "frame": (0, math.inf), "camera": (0, math.inf),
+    "vehicle_distance": (0.0, MAX_VEHICLE_DISTANCE), "relative_angle": HALF_TURN, "other_relative_angle": HALF_TURN,
+    "center_distance": METRES, "other_center_distance": METRES, "camera_left": METRES, "camera_yaw": HALF_TURN,
+    "frame": (0, math.inf), "camera": (0, math.inf), "time": (0.0, math.inf), "speed": (-100.0, 100.0),
     **{f"{kind}_{name}": SHARE for kind in ("driven", "clean") for name in ("throttle", "brake")},
     **{f"{kind}_steer": (-1.0, 1.0) for kind in ("driven", "clean")},
 }  # fmt: skip
@@ -157,7 +157,7 @@ def read_episode(path: Path | str, semantic: bool = False) -> Episode:
     try:
         names = pq.read_schema(path).names
         names = [name for name in names if semantic or name != SEMANTIC.name]
-        table = pq.read_table(path, columns=names, memory_map=False, partitioning=None)
+        table = pq.read_table(path, columns=names, memory_map=False, partitioning=None, page_checksum_verification=True)
         header = _header(path, table.schema)
         scenario = scenario_from_values(read_json(header["scenario"], dict[str, Any]))
         table = table.sort_by([("camera", "ascending"), ("frame", "ascending")])
@@ -181,7 +181,10 @@ def _check_values(path: Path, table: pa.Table, columns: dict[str, NDArray[Any]])
     wrong += [name for name, c in columns.items() if c.dtype.kind == "f" and not np.isfinite(c).all()]
     for name, (low, high) in RANGES.items():
         wrong += [name] * (not ((columns[name] >= low) & (columns[name] <= high)).all())
-    wrong += ["speed_sign"] * (not set(columns["speed_sign"]) <= {0, *SPEED_SIGNS})
+    known = {"hazard_stop": {0, 1}, "red_light": {0, 1}, "speed_sign": {0, *SPEED_SIGNS}}
+    wrong += [name for name, values in known.items() if not set(columns[name]) <= values]
+    moments = np.stack([columns["camera"], columns["frame"]])
+    wrong += ["frame"] * (np.unique(moments, axis=1).shape != moments.shape)
     commands = {command.value for command in Command}
     wrong += ["command"] * (not set(columns["command"]) <= commands)
     wrong += ["other_command"] * (not set(columns["other_command"]) <= commands | {""})

@@ -131,6 +131,7 @@ class EpisodeWriter:
             buffer,
             use_dictionary=["episode", "command", "other_command"],
             compression=dict.fromkeys(columns, "zstd") | {"image": "none"},
+            write_page_checksum=True,  # a bit that turns over in an image mostly leaves a JPEG that can be decoded
         )
         write_whole(self.path, buffer.getvalue())
         self._rows = []

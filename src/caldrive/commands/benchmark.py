@@ -78,7 +78,8 @@ class Report(Output):
         runs = load_runs(self.folders)
         require_writable_folder(self.out)
         progress("writing", 0.2)
-        write_whole(self.out / "report.md", report_text(runs).encode())
-        write_whole(self.out / "report.html", report_page(runs).encode())
+        text, page = report_text(runs), report_page(runs)
+        write_whole(self.out / "report.md", text.encode())
+        write_whole(self.out / "report.html", page.encode())
         values = {"out": str(self.out), "runs": [run.name for run in runs], "failures": len(failures(runs))}
         return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from caldrive.datatypes import Scenario
 from caldrive.driving.cluster import require_ray, spread_over_cluster
 from caldrive.driving.drivers import controller_config, require_agent
 from caldrive.driving.ledger import RESULTS, append, claim, held, provenance, read_lines, read_run
@@ -23,6 +24,8 @@ from caldrive.driving.suites import SUITES, Driven, Trial, suite
 from caldrive.driving.trace import result_from_values
 from caldrive.driving.worker import TrialRecord, drive_trial
 from caldrive.files import write_whole
+from caldrive.world import pedestrians, traffic
+from caldrive.world.route import plan_route
 from caldrive.world.towns import load_town
 from caldrive.world.weather import weather
 
@@ -79,13 +82,22 @@ def _check(settings: BenchmarkSettings) -> None:
 
 
 def _check_places(suite: str, trials: list[Trial]) -> None:
-    """Refuses towns and weathers that there are not."""
+    """Refuses towns, weathers and ways that there are not, and more cars or people than there is room for."""
     for trial in trials:
         try:
-            weather(trial.scenario.weather)
-            load_town(trial.scenario.town)
+            _check_place(trial.scenario)
         except (ValueError, OSError) as error:
             raise ValueError(f"found that {trial.key} in {suite} is nowhere ({error}): change its scenario") from error
+
+
+def _check_place(scenario: Scenario) -> None:
+    weather(scenario.weather)
+    roads = load_town(scenario.town)
+    plan_route(roads, scenario.start, scenario.goal)
+    asked = {"n_vehicles": scenario.n_vehicles, "n_pedestrians": scenario.n_pedestrians}
+    for name, most in {"n_vehicles": traffic.room(roads), "n_pedestrians": pedestrians.room(roads)}.items():
+        if asked[name] > most:
+            raise ValueError(f"{name} is {asked[name]}, but {scenario.town} has room for {most}")
 
 
 def _benchmark(

@@ -7,7 +7,6 @@ same files as an unbroken one.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
@@ -22,9 +21,10 @@ from caldrive.driving.recorder import record_episode
 from caldrive.episodes import FORMAT_VERSION, MANIFEST, episode_path
 from caldrive.files import write_whole
 from caldrive.progress import Progress, silent
+from caldrive.typed import read_json
+from caldrive.world import pedestrians, traffic
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.towns import load_town
-from caldrive.world.traffic import room
 from caldrive.world.weather import weather
 
 _world: EmbeddedWorld | None = None
@@ -41,7 +41,7 @@ def _record(config: CollectConfig, folder: Path, number: int) -> int:
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
     limits = {
-        "episodes": (1, 100_000), "duration": (0.1, 3600.0), "people": (0, math.inf),
+        "episodes": (1, 100_000), "duration": (0.1, 3600.0),
         "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS), "seed": (0, MOST_SEED), "rearranged": (0.0, 1.0),
         "workers": (1, MOST_WORKERS),
     }  # fmt: skip
@@ -52,8 +52,9 @@ def _check(config: CollectConfig, workers: int) -> None:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 8 3 1 8 6")
     for number in config.weathers:
         weather(number)
-    most = room(load_town(config.town))
-    require_within("--cars", config.cars, 0, most, min(most, usual["cars"]))
+    roads = load_town(config.town)
+    for name, most in {"cars": traffic.room(roads), "people": pedestrians.room(roads)}.items():
+        require_within(f"--{name}", asked[name], 0, most, min(most, usual[name]))
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
@@ -62,12 +63,11 @@ def _read_manifest(path: Path) -> dict[str, Any]:
             f"found episodes in {path.parent}, but no {path.name} that says how they came: give another --out"
         )
     try:
-        found = json.loads(path.read_text())
-    except ValueError:
-        found = None
-    if not isinstance(found, dict):
-        raise ValueError(f"found that {path} is damaged, wanted a recording's settings: give another --out")
-    return found
+        return read_json(path.read_bytes(), dict[str, Any])
+    except ValueError as error:
+        raise ValueError(
+            f"found that {path} is damaged ({error}), wanted a recording's settings: give another --out"
+        ) from error
 
 
 def _claim(folder: Path, config: CollectConfig) -> None:
@@ -75,7 +75,9 @@ def _claim(folder: Path, config: CollectConfig) -> None:
     manifest = folder / MANIFEST
     wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION, "code": code_version()}))
     if any(folder.glob("*.parquet")):
-        _compare(folder, _read_manifest(manifest), wanted)
+        found = _read_manifest(manifest)
+        _compare(folder, found, wanted)
+        wanted["episodes"] = max(n for n in (config.episodes, found.get("episodes")) if isinstance(n, int))
     write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
 
 

@@ -8,7 +8,7 @@ import math
 import struct
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import torch
 from safetensors import SafetensorError
@@ -18,11 +18,21 @@ from torch import Tensor
 from caldrive.files import write_whole
 from caldrive.perception.config import PerceptionConfig
 from caldrive.perception.network import Network
-from caldrive.perception.specs import describe
+from caldrive.perception.specs import SPECS, describe
 from caldrive.typed import as_type, read_json
 
 FORMAT_VERSION = 2
 KEY = "caldrive"
+
+
+class DataSummary(TypedDict, total=False):
+    """What a checkpoint remembers of its data. train_classes: frames of each class by discrete affordance;
+    validation_episodes: keys of those kept for validation."""
+
+    train_frames: int
+    validation_frames: int
+    train_classes: dict[str, list[int]]
+    validation_episodes: list[str]
 
 
 class CheckpointError(ValueError):
@@ -37,7 +47,7 @@ class CheckpointInfo:
     The metrics are those in the precision of the training, not in the 8 bits in which it may drive."""
 
     config: PerceptionConfig
-    data: dict[str, Any] = field(default_factory=dict)
+    data: DataSummary = field(default_factory=DataSummary)
     metrics: dict[str, float] = field(default_factory=dict)
     training: dict[str, Any] = field(default_factory=dict)
     seed: int = 0
@@ -60,7 +70,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     try:
         tensors = load(content)
         size = struct.unpack("<Q", content[:8])[0]
-        metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__", {})
+        metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__") or {}
         header = read_json(metadata[KEY], dict[str, Any]) if KEY in metadata else None
     except (SafetensorError, ValueError, struct.error) as error:
         raise CheckpointError(f"{path} is damaged or no safetensors file: copy it again or train anew") from error
@@ -101,7 +111,7 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
     tensors, header = read_tensors(path)
     if header.get("kind") != "network":
         raise CheckpointError(
-            f"{path} is a training state, not a finished network: give the model.safetensors beside it"
+            f"{path} is part of a training, no finished network: give the model.safetensors that it makes"
         )
     if header.get("specs") != json.loads(json.dumps(describe())):
         raise CheckpointError(
@@ -115,8 +125,22 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         raise CheckpointError(
             f"the weights in {path} do not fit its own configuration: train the network anew"
         ) from error
-    if not all(bool(value.isfinite().all()) for value in network.state_dict().values()):
-        raise CheckpointError(f"{path} has weights that are not numbers: train the network anew")
-    if not all(0 < one < math.inf for one in info.ranges):
-        raise CheckpointError(f"{path} has ranges of integers that are not more than 0: train the network anew")
+    if wrong := _wrong(network, info):
+        raise CheckpointError(f"{path} has {wrong}: train the network anew")
     return network.eval(), info
+
+
+def _wrong(network: Network, info: CheckpointInfo) -> str:
+    """What is not as a training leaves it, or nothing."""
+    state = network.state_dict()
+    if not all(bool(value.isfinite().all()) for value in state.values()):
+        return "weights that are not numbers"
+    if any(bool((value < 0).any()) for name, value in state.items() if name.endswith("running_var")):
+        return "variances less than 0"
+    if not all(0 < one < math.inf for one in info.ranges):
+        return "ranges of integers that are not more than 0"
+    outputs = {spec.name: spec.outputs for spec in SPECS if spec.discrete}
+    counts = info.data.get("train_classes", {})
+    if any(len(count) != outputs.get(name) or min(count) < 0 or not sum(count) for name, count in counts.items()):
+        return "counts of other classes than this caldrive's"
+    return ""

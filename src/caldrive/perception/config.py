@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+MOST_FRAMES, MOST_NODES, MOST_WIDTH = 1000, 10_000, 10.0  # more than anyone builds
+
 
 @dataclass(frozen=True)
 class BlockConfig:
@@ -21,6 +23,11 @@ class BlockConfig:
     length: int = 1
     dilation: int = 1
     norm: str = "batch"
+
+    def __post_init__(self) -> None:
+        within = 1 <= self.length <= MOST_FRAMES and 1 <= self.dilation <= MOST_FRAMES and 1 <= self.nodes <= MOST_NODES
+        if not within or not 0 <= self.dropout < 1:
+            raise ValueError(f"{self} cannot be built: give numbers from 1, and a dropout from 0 to less than 1")
 
     @property
     def span(self) -> int:
@@ -43,6 +50,10 @@ class PerceptionConfig:
     vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
     relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
     center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
+
+    def __post_init__(self) -> None:
+        if not 0 < self.width <= MOST_WIDTH or min(self.image_width, self.image_height) < 1:
+            raise ValueError("a network's width or its image's size cannot be built: give numbers over 0")
 
 
 PERCEPTIONS = {

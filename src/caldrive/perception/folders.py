@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from caldrive.datatypes import HAZARD_DISTANCE
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import EpisodeError
+from caldrive.perception.checkpoint import DataSummary
 from caldrive.perception.specs import SPECS
 
 
@@ -26,9 +27,22 @@ def episode_paths(folder: Path | str) -> list[Path]:
 def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
     """All episodes of a folder by name; semantic: with their semantic images, where they have them.
 
-    Raises EpisodeError where there is none, or one is damaged.
+    Raises EpisodeError where there is none, one is damaged, or one is there twice.
     """
-    return [read_episode(path, semantic) for path in episode_paths(folder)]
+    episodes = [read_episode(path, semantic) for path in episode_paths(folder)]
+    if again := repeated(episodes):
+        raise EpisodeError(again[0])
+    return episodes
+
+
+def repeated(episodes: Sequence[Episode]) -> list[str]:
+    """A sentence for each episode that is there again: one that trains must not validate, too."""
+    first = {episode.key: episode for episode in reversed(episodes)}
+    again = [episode for episode in episodes if first[episode.key] is not episode]
+    return [
+        f"{one.path} is the episode of {first[one.key].path} again: remove one, or record with another --seed"
+        for one in again
+    ]
 
 
 def joined(episodes: Sequence[Episode], name: str) -> NDArray[Any]:
@@ -65,7 +79,7 @@ def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Ep
     return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
 
 
-def held_out(episodes: Sequence[Episode], data: Mapping[str, Any]) -> list[Episode]:
+def held_out(episodes: Sequence[Episode], data: DataSummary) -> list[Episode]:
     """The episodes that a network's training kept for validation. data: what its checkpoint remembers (`summary`).
 
     Raises EpisodeError where they are not all among these episodes.

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import torch
 from torch import Tensor, nn
@@ -25,6 +25,7 @@ from caldrive.perception.sampler import Sampler
 from caldrive.perception.segmentation import segmentation_loss
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
+from caldrive.typed import as_type
 
 FREE = ("initial", "evaluate_every", "save_every", "cache_gb", "device")  # may change while a training is under way
 
@@ -46,6 +47,17 @@ def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
 def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
     """Those whose names begin with a prefix, without it."""
     return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
+
+
+class Header(TypedDict):
+    """What a training's state says of itself. training, config: settings of the training and of the network; episodes:
+    digest of the recording; processes: of the team."""
+
+    step: int
+    config: dict[str, Any]
+    training: dict[str, Any]
+    episodes: str
+    processes: int
 
 
 @dataclass
@@ -120,29 +132,45 @@ class TrainingRun:
         write_tensors(path, tensors, {"kind": "training"} | header)
 
     def restore(self, path: Path) -> None:
-        """Take up where `save` left off. Raises CheckpointError where the file belongs to another run."""
+        """Take up where `save` left off. Raises CheckpointError where the file belongs to another run or is damaged."""
         tensors, header = read_tensors(path)
-        found = _decisive(header.get("training", {})) | header.get("config", {})
+        if header.get("kind") != "training":
+            raise CheckpointError(f"{path} is no training's state, but a {header.get('kind')}: give another --out")
+        try:
+            known = as_type(header, Header)
+            self._check(path, tensors, known)
+            self._take(tensors, known)
+        except CheckpointError:
+            raise
+        except (KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise CheckpointError(f"{path} is damaged ({error}): remove it and train anew") from error
+
+    def _check(self, path: Path, tensors: dict[str, Tensor], header: Header) -> None:
+        """Refuses what belongs to another run."""
+        found = _decisive(header["training"]) | header["config"]
         for name, wanted in (_decisive(asdict(self.config)) | asdict(self.network.config)).items():
             if found.get(name) != wanted:
                 raise CheckpointError(
                     f"{path} belongs to a run with {name} {found.get(name)}, wanted {wanted}: give another --out"
                 )
-        known = _under("lessons.", tensors)
-        if known.keys() != self.lessons.state_dict().keys():
+        if _under("lessons.", tensors).keys() != self.lessons.state_dict().keys():
             raise CheckpointError(
                 f"{path} belongs to a run with other lessons, as on a recording with or without semantic images: "
                 "give the same --data or another --out"
             )
-        if header.get("episodes") != self.sampler.frames.digest:
+        if header["episodes"] != self.sampler.frames.digest:
             raise CheckpointError(
                 f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
             )
-        if header.get("processes") != self.team.size:
+        if header["processes"] != self.team.size:
             raise CheckpointError(
-                f"{path} belongs to a run of {header.get('processes')} processes, found {self.team.size}: start as many"
+                f"{path} belongs to a run of {header['processes']} processes, found {self.team.size}: start as many"
             )
-        self.lessons.load_state_dict(known)
+        if not 0 <= header["step"] <= self.config.steps:
+            raise ValueError(f"step {header['step']} of {self.config.steps}")
+
+    def _take(self, tensors: dict[str, Tensor], header: Header) -> None:
+        self.lessons.load_state_dict(_under("lessons.", tensors))
         self.config = replace(self.config, initial=header["training"]["initial"])
         self.optimizer.restore(_under("optimizer.", tensors))
-        self.step = int(header["step"])
+        self.step = header["step"]

@@ -13,7 +13,7 @@ import numpy as np
 from caldrive.episode_reader import Episode, read_episode
 from caldrive.episodes import MANIFEST, EpisodeError, episode_path
 from caldrive.files import write_figure
-from caldrive.perception.folders import class_counts, episode_paths, joined
+from caldrive.perception.folders import class_counts, episode_paths, joined, repeated
 from caldrive.perception.repaint import FREEDOM
 from caldrive.progress import Progress, silent
 from caldrive.typed import read_json
@@ -59,9 +59,22 @@ def _missing(manifest: Path) -> int:
     nobody can read what was asked for."""
     try:
         asked = read_json(manifest.read_bytes(), dict[str, Any]).get("episodes", 0)
+        if asked < 0:
+            raise ValueError(f"{asked} episodes")
         return sum(not episode_path(manifest.parent, k).is_file() for k in range(asked))
     except (ValueError, TypeError) as error:
         raise EpisodeError(f"{manifest} is damaged ({error}): record in another folder") from error
+
+
+def _of_another_size(episodes: list[Episode]) -> list[str]:
+    """A sentence for each episode whose images are not as large as the first one's."""
+    sizes = [episode.image(0).shape[:2] for episode in episodes]
+    return [
+        f"{episode.path} has images of {size[1]} x {size[0]}, {episodes[0].path} of {sizes[0][1]} x {sizes[0][0]}: "
+        "keep one size in a folder"
+        for episode, size in zip(episodes, sizes, strict=True)
+        if size != sizes[0]
+    ]
 
 
 def _tried(check: Callable[[Path], T], paths: list[Path], progress: Progress = silent) -> tuple[list[T], list[str]]:
@@ -82,6 +95,7 @@ def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recordin
     Raises EpisodeError where there is no episode at all.
     """
     sound, damaged = _tried(check_episode, episode_paths(folder), progress)
+    damaged += repeated(sound) + _of_another_size(sound)
     missing, unknown = _tried(_missing, sorted(folder.glob(f"**/{MANIFEST}")))
     minutes = sum(float(np.ptp(e.columns["time"])) for e in sound) / 60
     weathers = Counter(str(e.scenario.weather) for e in sound)

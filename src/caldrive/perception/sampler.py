@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE
 from caldrive.episodes import EpisodeError
+from caldrive.perception.checkpoint import DataSummary
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.specs import SPECS
 
@@ -76,8 +75,8 @@ class Sampler:
         }
 
 
-def summary(train: Frames, held: Frames) -> dict[str, Any]:
-    """What a checkpoint remembers of its data. validation_episodes: keys of those kept for validation."""
+def summary(train: Frames, held: Frames) -> DataSummary:
+    """What a checkpoint remembers of its data."""
     counts = {s.name: np.bincount(train.targets[s.name], minlength=s.outputs).tolist() for s in SPECS if s.discrete}
     return {
         "train_frames": len(train),

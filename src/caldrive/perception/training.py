@@ -38,9 +38,16 @@ def kept_rows(path: Path, step: int) -> list[Row]:
     damaged."""
     lines = path.read_bytes().splitlines() if path.is_file() else []
     try:
-        return [row for row in (read_json(line, Row) for line in lines) if row["step"] <= step]
-    except (ValueError, KeyError) as error:
+        return [row for row in map(_row, lines) if row["step"] <= step]
+    except ValueError as error:
         raise CheckpointError(f"{path} is damaged ({error}): remove the folder, or give another --out") from error
+
+
+def _row(line: bytes) -> Row:
+    row = read_json(line, Row)
+    if missing := {"step", "loss"} - row.keys():
+        raise ValueError(f"a row lacks {min(missing)}")
+    return row
 
 
 def validate(run: TrainingRun, held: Frames, model: Path, context: int) -> Row:
@@ -100,7 +107,7 @@ def train(
             rows.append(_step(run, held, out, rows))
             board.add(rows[-1])
             progress(f"training, step {run.step}, loss {rows[-1]['loss']:.3f}", run.step / config.steps)
-        if run.step == config.steps and _looks_back(run) and team.leads and not stop(run.step):
+        if run.step == config.steps and team.leads and not stop(run.step):
             _finish(run, held, out, rows, board, progress)
     return out / MODEL
 
@@ -116,10 +123,14 @@ def _looks_back(run: TrainingRun) -> bool:
 
 
 def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: Board, progress: Progress) -> None:
-    """The blocks that look back learn alone, unless they did already."""
-    last = run.config.steps + run.config.block_steps
-    if any(row["step"] == last for row in kept_rows(out / METRICS, last)):
+    """The blocks that look back learn alone, unless they did already. A network that somebody removed comes again."""
+    last, there = run.config.steps + run.config.block_steps, (out / MODEL).is_file()
+    if there and any(row["step"] == last for row in kept_rows(out / METRICS, last)):
         forget_features(out)
+        return
+    if not there:
+        validate(run, held, out / MODEL, run.context)
+    if not _looks_back(run):
         return
     info = load_network(out / MODEL)[1]
     features = feature_table(run, info, out, progress)

@@ -107,16 +107,20 @@ def _crossings(
     )
 
 
+def room(roads: RoadNetwork) -> int:
+    """How many people a town's sidewalks hold."""
+    return int(find_walks(roads).lengths.sum() / SPACE_PER_PERSON)
+
+
 class Pedestrians:
     """n people, all random choices from one generator. Raises ValueError for more people than sidewalks hold."""
 
     def __init__(self, roads: RoadNetwork, n: int, rng: np.random.Generator, crossing: float = 1.0) -> None:
         self.walks, self.rng, self.rate = find_walks(roads), rng, crossing / MEAN_WALK_BETWEEN_CROSSINGS
         lengths = self.walks.lengths
-        room = int(lengths.sum() / SPACE_PER_PERSON)
-        if n > room:
+        if n > room(roads):
             raise ValueError(
-                f"found {n} people asked for, but {roads.name} has room for {room}: ask for fewer with --people"
+                f"found {n} people asked for, but {roads.name} has room for {room(roads)}: ask for fewer with --people"
             )
         self.n = n
         self.names = [f"person{k}" for k in range(n)]

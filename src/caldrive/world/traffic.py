@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import libsumo
@@ -33,6 +34,7 @@ def places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
     return [(lane, float(s)) for lane in roads.driveable for s in np.arange(SPACING, lane.line.length - 2.0, SPACING)]
 
 
+@lru_cache(maxsize=8)
 def room(roads: RoadNetwork) -> int:
     """How many cars a town holds, wherever the ego stands."""
     here = np.array([(pose.x, pose.y) for pose in (lane.line.pose_at(s) for lane, s in places(roads))]).reshape(-1, 2)
