@@ -49,20 +49,6 @@ def test_the_push_at_the_wheel_goes_to_both_sides_and_weakens_with_speed() -> No
     assert np.abs(fast).max() <= (6 / 20) ** 2 + 1e-9
 
 
-def test_a_long_push_turns_the_car_no_further_than_a_short_one() -> None:
-    steers = [one.steer for one in pushes(5.0)]
-    turned = [abs(sum(run)) for _, run in groupby(steers, key=np.sign)]
-    assert 3.0 < max(turned) <= 4.5 + 1e-9  # steps of a full wheel
-
-
-def test_a_wheel_stays_as_it_is_for_six_metres_at_most() -> None:
-    for speed in (4.0, 10.0, 25.0):
-        disturbance = Disturbance(np.random.default_rng(3))
-        turning = (disturbance.apply(Control(throttle=0.4, steer=k / 10_000), speed).steer for k in range(5000))
-        longest = max(len(list(run)) for _, run in groupby(turning)) - 1  # the first of them is as wanted
-        assert 4.0 <= longest * speed * 0.1 <= 6.0 + 1e-9 or longest == 18  # of a slow car, no longer than a push
-
-
 def test_a_hard_braking_car_is_left_to_brake() -> None:
     assert {(one.throttle, one.brake) for one in pushes(8.0, control=Control(brake=0.8))} == {(0.0, 0.8)}
 

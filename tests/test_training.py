@@ -61,14 +61,6 @@ def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) 
     assert [r["step"] for r in rows[1]] == [1, 2, 3, 4, 5, 6]
 
 
-def test_a_killed_run_with_muon_resumes_to_the_same_weights(folder: Path, tmp_path: Path) -> None:
-    config = replace(SHORT, muon=20.0)
-    whole = train(config, folder, tmp_path / "whole", TINY)
-    train(config, folder, tmp_path / "killed", TINY, stop=lambda step: step == 3)
-    assert train(config, folder, tmp_path / "killed", TINY).read_bytes() == whole.read_bytes()
-    assert whole.read_bytes() != train(SHORT, folder, tmp_path / "adam", TINY).read_bytes()
-
-
 def test_a_run_is_not_taken_up_by_another_number_of_processes(folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 3)
     tensors, header = read_tensors(tmp_path / "state.safetensors")

@@ -128,7 +128,7 @@ class CollectConfig:
 
     town: str = "town01"
     weathers: tuple[int, ...] = (1, 8, 3, 1, 8, 6)
-    episodes: int = 1400
+    episodes: int = 1800
     duration: float = 12.0
     cars: int = 75
     people: int = 70

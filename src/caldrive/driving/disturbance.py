@@ -9,17 +9,11 @@ from caldrive.config import LongitudinalConfig
 from caldrive.datatypes import Control
 
 HARD = LongitudinalConfig.red_floor  # brake in [0, 1] before a red light and at a hazard; a car ahead may ask for it
-SHORT = 9  # steps; a longer push is weaker, and turns the car no further
-REACH = 60.0  # m/s times steps: for 6 m at ten steps a second may a wheel stay as it is
 
 
 class Disturbance:
     """Short mishaps at random times, so that recoveries are seen: triangular pushes at wheel and pedals, and a wheel
-    that stays as it is, which lets the car turn in too late or keep turning for too long.
-
-    They end before the car has left its lane far behind, as a distance of 2 m is the largest that `center_distance`
-    can tell. How to come back from farther away is seen where a car begins there.
-    """
+    that stays as it is, which lets the car turn in too late or keep turning for too long."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng, self.remaining, self.length, self.push, self.pedal, self.wheel = rng, 0, 1, 0.0, 0.0, 0.0
@@ -37,15 +31,12 @@ class Disturbance:
         return Control(*(float(np.clip(x, low, 1)) for x, low in ((effort, 0), (-effort, 0), (steer, -1))))
 
     def _begin(self, control: Control, speed: float) -> None:
-        length = int(self.rng.integers(6, 19))
+        self.remaining = self.length = int(self.rng.integers(6, 19))
         self.pedal = float(self.rng.choice([0.0, 0.0, -0.4, 0.5]))
         self.wheel, self.push = control.steer, 0.0
         if self.rng.random() < 0.6:
-            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2) * min(1.0, SHORT / length)
+            strength = self.rng.uniform(0.3, 1.0) * min(1.0, (6.0 / speed) ** 2)
             self.push = float(self.rng.choice([-1, 1]) * strength)
-        else:
-            length = max(1, min(length, int(REACH / speed)))
-        self.remaining = self.length = length
 
 
 class LateStart:

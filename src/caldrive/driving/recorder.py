@@ -23,7 +23,7 @@ from caldrive.world.route import Route, random_route
 from caldrive.world.traffic import room
 
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
-ASIDE, ASKEW = (-1.5, 0.0, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, most often little, and rad
+ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
 MAX_YAW = math.radians(15)
 GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
 CAPS = (20.0, 20.0, None)  # km/h, one of them at random, None for the signs alone; tailgaters have the first
@@ -86,7 +86,7 @@ def _set_up(
     agent = CALAgent(_oracle(world, config, tailgating, rng), Controller(ControlConfig(laws, cap=cap)))
     world.start(scenario, route)
     if rng.random() < config.displaced:
-        world.displace(float(rng.triangular(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
+        world.displace(float(rng.uniform(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
     agent.reset()
     return scenario, agent
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import torch
+from torch.optim import Adam
 
 from caldrive.perception.calibration import uncalibrated
 from caldrive.perception.checkpoint import CheckpointError, load_network
@@ -14,7 +15,6 @@ from caldrive.perception.dataset import Frames
 from caldrive.perception.lessons import Lessons
 from caldrive.perception.network import Network
 from caldrive.perception.optimisation import TrainingRun
-from caldrive.perception.optimizer import Optimizer
 from caldrive.perception.sampler import Sampler
 from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.specs import SPECS, class_weights
@@ -62,5 +62,4 @@ def start(
     lessons = Lessons(network, head, config.at_once).to(team.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
     weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    optimizer = Optimizer(lessons, network.backbone.convolutions(), config)
-    return TrainingRun(config, lessons, optimizer, sampler, weights, team)
+    return TrainingRun(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)

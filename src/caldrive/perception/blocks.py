@@ -19,13 +19,13 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.optim import Adam
 
 from caldrive.perception.backbone import Backbone
 from caldrive.perception.checkpoint import CheckpointError, CheckpointInfo, read_tensors, round_to_half, write_tensors
 from caldrive.perception.dataset import Frames, Ids
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.optimisation import TrainingRun, learning_rate
-from caldrive.perception.optimizer import Optimizer
+from caldrive.perception.optimisation import TrainingRun, descend, learning_rate
 from caldrive.perception.precision import Features, driving_precision, features_in
 from caldrive.perception.specs import loss
 from caldrive.progress import Progress
@@ -89,16 +89,14 @@ def learn_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
     config = replace(run.config, steps=run.config.block_steps)  # the rate's warm-up and cosine begin anew
     weights = {name: weight.cpu() for name, weight in run.weights.items()}
     blocks = nn.ModuleDict({name: b for name, b in run.network.task_blocks().items() if b.config.length > 1})
-    optimizer = Optimizer(blocks, [], config)
+    optimizer = Adam(blocks.parameters(), config.learning_rate)
     blocks.train()
     for step in range(config.block_steps):
         number = run.config.steps + step  # of the whole training
         torch.manual_seed(config.seed * 1_000_003 + number)  # dropout
         seen, command, targets = _lesson(run, features, number)
         total = loss({name: block(seen, command) for name, block in blocks.items()}, targets, weights)
-        total.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(blocks.parameters(), config.clip)
-        optimizer.step(learning_rate(step, config))
+        descend(optimizer, total, learning_rate(step, config), config.clip)
         yield float(total.detach())
 
 

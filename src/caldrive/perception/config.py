@@ -79,7 +79,6 @@ class TrainingConfig:
     """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
 
     batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
-    muon: the backbone's convolutions learn by Muon (`perception/optimizer.py`) at this many times the rate; 0: by Adam.
     augment: colours, light, blur and noise; repaint: where the recording has semantic images, also the colours of what
     stands there. others: share of the windows that are seen under another command, where one could be given.
     angle_weight, segmentation: what the relative angle's loss and the second lesson's (where the recording has semantic
@@ -94,11 +93,10 @@ class TrainingConfig:
     to begin with, None for a new one.
     """
 
-    steps: int = 8_000
+    steps: int = 11_000
     batch: int = 64
     window: int = 1
     learning_rate: float = 1e-3
-    muon: float = 0.0
     warm_up: int = 100
     final_rate: float = 0.02
     clip: float = 5.0
@@ -108,7 +106,7 @@ class TrainingConfig:
     others: float = 0.5
     angle_weight: float = 1.0
     segmentation: float = 0.5
-    block_steps: int = 6_000
+    block_steps: int = 3_000
     block_batch: int = 256
     at_once: int | None = None
     validation_share: float = 0.05
@@ -122,7 +120,7 @@ class TrainingConfig:
 
 
 TRAININGS = {
-    "small": TrainingConfig(muon=20.0, angle_weight=20.0),
+    "small": TrainingConfig(angle_weight=5.0),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
     "paper": TrainingConfig(
         steps=75_000,

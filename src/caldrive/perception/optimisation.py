@@ -11,6 +11,7 @@ from typing import Any, TypedDict
 import torch
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
+from torch.optim import Adam
 
 from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.config import TrainingConfig
@@ -18,7 +19,6 @@ from caldrive.perception.dataset import Batch
 from caldrive.perception.images import augment, normalise, to_float
 from caldrive.perception.lessons import Lessons
 from caldrive.perception.network import Network
-from caldrive.perception.optimizer import Optimizer
 from caldrive.perception.precision import autocast
 from caldrive.perception.repaint import repaint
 from caldrive.perception.sampler import Sampler
@@ -37,6 +37,16 @@ def learning_rate(step: int, config: TrainingConfig) -> float:
     done = (step - config.warm_up) / max(1, config.steps - config.warm_up)
     share = config.final_rate + (1 - config.final_rate) * (1 + math.cos(math.pi * done)) / 2
     return config.learning_rate * share
+
+
+def descend(optimizer: Adam, total: Tensor, rate: float, clip: float) -> None:
+    """One step of Adam's down the gradient of a loss, no longer than clip; then the gradient is gone."""
+    (group,) = optimizer.param_groups
+    group["lr"] = rate
+    total.backward()  # type: ignore[no-untyped-call]
+    torch.nn.utils.clip_grad_norm_(group["params"], clip)
+    optimizer.step()
+    optimizer.zero_grad(set_to_none=True)
 
 
 def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
@@ -66,7 +76,7 @@ class TrainingRun:
 
     config: TrainingConfig
     lessons: Lessons
-    optimizer: Optimizer
+    optimizer: Adam
     sampler: Sampler
     weights: ClassWeights
     team: Team
@@ -106,9 +116,7 @@ class TrainingRun:
         if batch.semantics is not None and "segmentation" in outputs:
             second = segmentation_loss(outputs["segmentation"], batch.semantics, generator)
             total = total + config.segmentation * second
-        total.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.lessons.parameters(), config.clip)
-        self.optimizer.step(learning_rate(self.step, config))
+        descend(self.optimizer, total, learning_rate(self.step, config), config.clip)
         self.step += 1
         return float(total.detach())
 
@@ -124,7 +132,8 @@ class TrainingRun:
     def save(self, path: Path) -> None:
         """Write all that the next step depends on."""
         tensors = {f"lessons.{name}": value for name, value in self.lessons.state_dict().items()}
-        tensors |= {f"optimizer.{name}": value for name, value in self.optimizer.state().items()}
+        for number, state in self.optimizer.state_dict()["state"].items():
+            tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
         header = {
             "step": self.step, "config": asdict(self.network.config), "training": asdict(self.config),
             "episodes": self.sampler.frames.digest, "processes": self.team.size,
@@ -172,5 +181,10 @@ class TrainingRun:
     def _take(self, tensors: dict[str, Tensor], header: Header) -> None:
         self.lessons.load_state_dict(_under("lessons.", tensors))
         self.config = replace(self.config, initial=header["training"]["initial"])
-        self.optimizer.restore(_under("optimizer.", tensors))
+        states: dict[int, dict[str, Tensor]] = {}
+        for path, value in _under("optimizer.", tensors).items():
+            number, name = path.split(".")
+            states.setdefault(int(number), {})[name] = value
+        groups = self.optimizer.state_dict()["param_groups"]
+        self.optimizer.load_state_dict({"state": states, "param_groups": groups})
         self.step = header["step"]

@@ -14,7 +14,7 @@ from caldrive.perception.specs import SPECS
 # Edges of the classes in which the size of a continuous column is balanced.
 SIZES = {
     "vehicle_distance": (3.0, 6.0, 12.0, 25.0, MAX_VEHICLE_DISTANCE),
-    "center_distance": (0.4, 0.8, 1.6),
+    "center_distance": (0.4, 0.8, 1.2),
     "clean_steer": (0.05, 0.15, 0.4),
 }
 WAITING = 0.25  # weight of a frame in which the car stands and has to: it looks like the one before

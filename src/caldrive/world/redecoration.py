@@ -129,7 +129,7 @@ def _crown(crown: Crown, rng: np.random.Generator) -> Crown:
     """A tree of the training town, thicker or thinner, lower or higher up, of another colour."""
     wide, foot = float(rng.uniform(0.5, 1.3)), float(rng.uniform(-0.9, 0.9))
     profile = tuple((r * wide, z + foot * (6.0 - z) / 4.0) for r, z in crown.profile)
-    color = _tint(rng, 60, 220, 0.8)
+    color = _tint(rng, 60, 190, 0.5)
     return Crown(profile, color, one_of((Tex.LEAVES, Tex.LEAVES, Tex.GRASS), rng), _tint(rng, 50, 200, 0.2))
 
 
