@@ -4,16 +4,13 @@ to the same weights."""
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any, TypedDict
+from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 from torch.optim import Adam
 
-from caldrive.perception.checkpoint import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.config import TrainingConfig
 from caldrive.perception.dataset import Batch
 from caldrive.perception.images import augment, normalise, to_float
@@ -25,9 +22,6 @@ from caldrive.perception.sampler import Sampler
 from caldrive.perception.segmentation import segmentation_loss
 from caldrive.perception.specs import ClassWeights, loss
 from caldrive.perception.team import Team
-from caldrive.typed import as_type
-
-FREE = ("initial", "evaluate_every", "save_every", "cache_gb", "device")  # may change while a training is under way
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -47,27 +41,6 @@ def descend(optimizer: Adam, total: Tensor, rate: float, clip: float) -> None:
     torch.nn.utils.clip_grad_norm_(group["params"], clip)
     optimizer.step()
     optimizer.zero_grad(set_to_none=True)
-
-
-def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
-    """Those of a training's settings on which its weights depend once it has begun."""
-    return {name: value for name, value in settings.items() if name not in FREE}
-
-
-def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Those whose names begin with a prefix, without it."""
-    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
-
-
-class Header(TypedDict):
-    """What a training's state says of itself. training, config: settings of the training and of the network; episodes:
-    digest of the recording; processes: of the team."""
-
-    step: int
-    config: dict[str, Any]
-    training: dict[str, Any]
-    episodes: str
-    processes: int
 
 
 @dataclass
@@ -128,63 +101,3 @@ class TrainingRun:
         if self.config.repaint and batch.semantics is not None:
             images = repaint(images, batch.semantics, batch.group, generator)
         return augment(images, generator, batch.group)
-
-    def save(self, path: Path) -> None:
-        """Write all that the next step depends on."""
-        tensors = {f"lessons.{name}": value for name, value in self.lessons.state_dict().items()}
-        for number, state in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
-        header = {
-            "step": self.step, "config": asdict(self.network.config), "training": asdict(self.config),
-            "episodes": self.sampler.frames.digest, "processes": self.team.size,
-        }  # fmt: skip
-        write_tensors(path, tensors, {"kind": "training"} | header)
-
-    def restore(self, path: Path) -> None:
-        """Take up where `save` left off. Raises CheckpointError where the file belongs to another run or is damaged."""
-        tensors, header = read_tensors(path)
-        if header.get("kind") != "training":
-            raise CheckpointError(f"{path} is no training's state, but a {header.get('kind')}: give another --out")
-        try:
-            known = as_type(header, Header)
-            self._check(path, tensors, known)
-            self._take(tensors, known)
-        except CheckpointError:
-            raise
-        except (KeyError, ValueError, TypeError, RuntimeError) as error:
-            raise CheckpointError(f"{path} is damaged ({error}): remove it and train anew") from error
-
-    def _check(self, path: Path, tensors: dict[str, Tensor], header: Header) -> None:
-        """Refuses what belongs to another run."""
-        found = _decisive(header["training"]) | header["config"]
-        for name, wanted in (_decisive(asdict(self.config)) | asdict(self.network.config)).items():
-            if found.get(name) != wanted:
-                raise CheckpointError(
-                    f"{path} belongs to a run with {name} {found.get(name)}, wanted {wanted}: give another --out"
-                )
-        if _under("lessons.", tensors).keys() != self.lessons.state_dict().keys():
-            raise CheckpointError(
-                f"{path} belongs to a run with other lessons, as on a recording with or without semantic images: "
-                "give the same --data or another --out"
-            )
-        if header["episodes"] != self.sampler.frames.digest:
-            raise CheckpointError(
-                f"{path} belongs to a run on other episodes: give the --data that it began with, or another --out"
-            )
-        if header["processes"] != self.team.size:
-            raise CheckpointError(
-                f"{path} belongs to a run of {header['processes']} processes, found {self.team.size}: start as many"
-            )
-        if not 0 <= header["step"] <= self.config.steps:
-            raise ValueError(f"step {header['step']} of {self.config.steps}")
-
-    def _take(self, tensors: dict[str, Tensor], header: Header) -> None:
-        self.lessons.load_state_dict(_under("lessons.", tensors))
-        self.config = replace(self.config, initial=header["training"]["initial"])
-        states: dict[int, dict[str, Tensor]] = {}
-        for path, value in _under("optimizer.", tensors).items():
-            number, name = path.split(".")
-            states.setdefault(int(number), {})[name] = value
-        groups = self.optimizer.state_dict()["param_groups"]
-        self.optimizer.load_state_dict({"state": states, "param_groups": groups})
-        self.step = header["step"]

@@ -23,6 +23,7 @@ from caldrive.perception.folders import find_episodes, split
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.optimisation import TrainingRun, learning_rate
 from caldrive.perception.sampler import summary
+from caldrive.perception.state import restore_state, save_state
 from caldrive.perception.team import join
 from caldrive.progress import Progress, silent
 from caldrive.typed import read_json
@@ -99,7 +100,7 @@ def train(
     known = begun(out)  # then what the run began with is needed no more
     run = start(config, perception, frames, None if known else imagenet, team, None if known else config.initial)
     if known:
-        run.restore(out / STATE)
+        restore_state(out / STATE, run)
     team.wait()
     rows = kept_rows(out / METRICS, run.step)
     with closing(Board(out / "tensorboard", team.leads, run.step)) as board:
@@ -166,5 +167,5 @@ def _step(run: TrainingRun, held: Frames, out: Path, rows: list[Row]) -> Row:
         run.team.wait()
     if run.team.leads and (last or run.step % config.save_every == 0):
         write_whole(out / METRICS, "".join(json.dumps(r) + "\n" for r in [*rows, row]).encode())
-        run.save(out / STATE)
+        save_state(out / STATE, run)
     return row
