@@ -190,6 +190,16 @@ def test_a_damaged_state_is_not_taken_up(change: dict[str, Any], said: str, fold
         train(SHORT, folder, tmp_path, TINY)
 
 
+@pytest.mark.parametrize("part", ["optimizer", "lessons"])
+def test_a_state_without_one_of_its_parts_is_not_taken_up(part: str, folder: Path, tmp_path: Path) -> None:
+    train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 2)
+    tensors, header = read_tensors(tmp_path / "state.safetensors")
+    rest = {name: value for name, value in tensors.items() if not name.startswith(part)}
+    write_tensors(tmp_path / "state.safetensors", rest, header)
+    with pytest.raises(CheckpointError, match=r"without the optimizer|other lessons"):
+        train(SHORT, folder, tmp_path, TINY)
+
+
 @pytest.mark.parametrize("config", [SHORT, BLOCKS], ids=["all", "blocks"])
 def test_a_network_that_was_removed_comes_again(config: TrainingConfig, folder: Path, tmp_path: Path) -> None:
     model = train(config, folder, tmp_path, TINY)

@@ -91,6 +91,8 @@ def _take(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> None:
     for path, value in _under("optimizer.", tensors).items():
         number, name = path.split(".")
         states.setdefault(int(number), {})[name] = value
+    if header["step"] and not states:
+        raise ValueError("without the optimizer's tensors")
     groups = run.optimizer.state_dict()["param_groups"]
     run.optimizer.load_state_dict({"state": states, "param_groups": groups})
     run.step = header["step"]
