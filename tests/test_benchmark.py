@@ -128,7 +128,7 @@ def test_a_trial_that_cannot_be_is_named_before_there_is_a_folder(
     first, last = suite(whole.suite)[:2]
     trials = [first, replace(last, scenario=replace(last.scenario, **change))]
     (tmp_path / "own.json").write_text(to_json(trials))
-    with pytest.raises(ValueError, match=f"{last.key} in .* is nowhere .{said}"):
+    with pytest.raises(ValueError, match=f"{last.key} in .* cannot be driven .{said}"):
         next(benchmark(replace(whole, suite=str(tmp_path / "own.json"), out=tmp_path / "out")))
     assert not (tmp_path / "out").exists()
 

@@ -30,7 +30,7 @@ def test_one_episode_is_too_few(folder: Path, tmp_path: Path) -> None:
 def test_an_episode_that_is_there_again_is_refused(tmp_path: Path) -> None:
     record(tmp_path, n_episodes=2, n_frames=3)
     (tmp_path / "again.parquet").write_bytes((tmp_path / "episode1.parquet").read_bytes())
-    with pytest.raises(EpisodeError, match=r"again: remove one"):
+    with pytest.raises(EpisodeError, match=r"has id, town, weather and seed of"):
         find_episodes(tmp_path)
 
 

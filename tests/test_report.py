@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import io
 import json
 import re
 import shutil
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import simplejpeg
+from rich.console import Console
 
 from caldrive.driving import report_page as page_module
 from caldrive.driving.report import BenchmarkRun, failures, load_run, load_runs
@@ -23,6 +25,7 @@ from caldrive.driving.report_page import report_page
 from caldrive.driving.report_tables import tables
 from caldrive.driving.report_text import report_text
 from caldrive.driving.suites import Driven, suite
+from caldrive.driving.tables_benchmark import benchmark_table
 from caldrive.driving.trace import result_values
 from caldrive.driving.witness import trace_path
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
@@ -56,6 +59,17 @@ def run(name: str, folder: Path) -> BenchmarkRun:
         result = EpisodeResult(trial.scenario, outcome, 50.0, 250.0, 200.0, 250.0, broken, COMFORT)
         driven.append(Driven(trial, result, FIGURES))
     return BenchmarkRun(name, folder, ABOUT | {"agent": name}, tuple(driven))
+
+
+def test_names_with_brackets_stand_in_the_terminals_tables_as_they_are(tmp_path: Path) -> None:
+    (one, *_) = run("cal", tmp_path).driven
+    trial = replace(one.trial, condition="[/wet]", scenario=replace(one.trial.scenario, task="[bold]turn"))
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(benchmark_table([replace(one, trial=trial)], "out/[red]"))
+    said = console.export_text()
+    assert said.count("[/wet]") == 2
+    assert "[bold]turn" in said
+    assert "out/[red]" in said
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.lessons import Lessons
 from caldrive.perception.memory import keep_memory
 from caldrive.perception.network import Network
-from caldrive.perception.optimisation import learning_rate
+from caldrive.perception.optimisation import descend, learning_rate
 from caldrive.perception.precision import use_bf16
 from caldrive.perception.segmentation import STAGE, Segmentation
 from caldrive.perception.training import train
@@ -190,13 +190,13 @@ def test_a_damaged_state_is_not_taken_up(change: dict[str, Any], said: str, fold
         train(SHORT, folder, tmp_path, TINY)
 
 
-@pytest.mark.parametrize("part", ["optimizer", "lessons"])
+@pytest.mark.parametrize("part", ["optimizer", "optimizer.3.exp_avg", "lessons"])
 def test_a_state_without_one_of_its_parts_is_not_taken_up(part: str, folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 2)
     tensors, header = read_tensors(tmp_path / "state.safetensors")
     rest = {name: value for name, value in tensors.items() if not name.startswith(part)}
     write_tensors(tmp_path / "state.safetensors", rest, header)
-    with pytest.raises(CheckpointError, match=r"without the optimizer|other lessons"):
+    with pytest.raises(CheckpointError, match=r"without all of the optimizer|other lessons"):
         train(SHORT, folder, tmp_path, TINY)
 
 
@@ -206,6 +206,20 @@ def test_a_network_that_was_removed_comes_again(config: TrainingConfig, folder: 
     whole = model.read_bytes()
     model.unlink()
     assert train(config, folder, tmp_path, TINY).read_bytes() == whole
+
+
+def test_a_network_that_was_removed_and_whose_blocks_were_killed_comes_again(folder: Path, tmp_path: Path) -> None:
+    def kill(label: str, share: float) -> None:
+        if label.startswith("blocks, step 2"):
+            raise KeyboardInterrupt
+
+    model = train(BLOCKS, folder, tmp_path, TINY)
+    whole = model.read_bytes()
+    model.unlink()
+    with pytest.raises(KeyboardInterrupt):
+        train(BLOCKS, folder, tmp_path, TINY, progress=kill)
+    assert model.read_bytes() != whole
+    assert train(BLOCKS, folder, tmp_path, TINY).read_bytes() == whole
 
 
 def test_damaged_metrics_are_named(folder: Path, tmp_path: Path) -> None:
@@ -261,6 +275,16 @@ def test_the_rate_warms_up_and_falls() -> None:
     assert max(rates) == rates[10] == 1.0
     assert rates[99] == pytest.approx(0.1, abs=0.01)
     assert rates[10:] == sorted(rates[10:], reverse=True)
+
+
+@pytest.mark.parametrize(("rate", "clip"), [(0.0, 5.0), (0.01, 5.0), (0.01, 0.5)])
+def test_a_step_is_as_long_as_the_rate_and_its_gradient_no_longer_than_the_clip(rate: float, clip: float) -> None:
+    weight = torch.nn.Parameter(torch.zeros(2))
+    optimizer = torch.optim.Adam([weight], lr=1.0)
+    descend(optimizer, (torch.tensor([3.0, -4.0]) * weight).sum(), rate, clip)
+    assert weight.detach().tolist() == pytest.approx([-rate, rate])  # Adam's first step is the gradient's sign
+    assert optimizer.state[weight]["exp_avg"].norm() == pytest.approx(0.1 * clip, rel=1e-3)  # of a gradient of 5
+    assert weight.grad is None
 
 
 def test_an_unknown_precision_is_named() -> None:

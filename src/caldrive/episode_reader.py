@@ -16,6 +16,7 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from caldrive.datatypes import (
+    MAX_CENTER_DISTANCE,
     MAX_VEHICLE_DISTANCE,
     SPEED_SIGNS,
     Affordances,
@@ -39,11 +40,11 @@ from caldrive.episodes import (
 from caldrive.scenarios import scenario_from_values
 from caldrive.typed import read_json
 
-SHARE, HALF_TURN, METRES = (0.0, 1.0), (-math.pi, math.pi), (-1000.0, 1000.0)
-RANGES = {  # of what a recorder can write
+SHARE, HALF_TURN, ASIDE = (0.0, 1.0), (-math.pi, math.pi), (-MAX_CENTER_DISTANCE, MAX_CENTER_DISTANCE)
+RANGES = {  # of what a recorder writes, or nearly: no car drives 100 m/s
     "vehicle_distance": (0.0, MAX_VEHICLE_DISTANCE), "relative_angle": HALF_TURN, "other_relative_angle": HALF_TURN,
-    "center_distance": METRES, "other_center_distance": METRES, "camera_left": METRES, "camera_yaw": HALF_TURN,
-    "frame": (0, math.inf), "camera": (0, math.inf), "time": (0.0, math.inf), "speed": (-100.0, 100.0),
+    "center_distance": ASIDE, "other_center_distance": ASIDE, "camera_left": (-10.0, 10.0), "camera_yaw": HALF_TURN,
+    "frame": (0, math.inf), "camera": (0, math.inf), "time": (0.0, math.inf), "speed": (0.0, 100.0),
     **{f"{kind}_{name}": SHARE for kind in ("driven", "clean") for name in ("throttle", "brake")},
     **{f"{kind}_steer": (-1.0, 1.0) for kind in ("driven", "clean")},
 }  # fmt: skip

@@ -20,14 +20,16 @@ class Collect(CollectSettings, Output):
         from caldrive.driving.collection import collect
         from caldrive.driving.outputs import require_writable_folder
         from caldrive.driving.tables import counts_table
-        from caldrive.perception.folders import class_counts, find_episodes
+        from caldrive.episode_reader import read_episode
+        from caldrive.episodes import episode_path
+        from caldrive.perception.folders import class_counts
 
         require_writable_folder(self.out)
         asked = {field.name: getattr(self, field.name) for field in fields(CollectConfig) if hasattr(self, field.name)}
         config = CollectConfig(**asked)
         for _ in collect(config, self.out, self.workers, progress):
             pass
-        counts = class_counts(find_episodes(self.out))
+        counts = class_counts([read_episode(episode_path(self.out, k)) for k in range(config.episodes)])
         return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
 
 

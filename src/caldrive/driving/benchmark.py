@@ -87,7 +87,9 @@ def _check_places(suite: str, trials: list[Trial]) -> None:
         try:
             _check_place(trial.scenario)
         except (ValueError, OSError) as error:
-            raise ValueError(f"found that {trial.key} in {suite} is nowhere ({error}): change its scenario") from error
+            raise ValueError(
+                f"found that {trial.key} in {suite} cannot be driven ({error}): change its scenario"
+            ) from error
 
 
 def _check_place(scenario: Scenario) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MOST_FRAMES, MOST_NODES, MOST_WIDTH = 1000, 10_000, 10.0  # more than anyone builds
+MOST_FRAMES, MOST_NODES, MOST_WIDTH, MOST_PIXELS = 1000, 10_000, 10.0, 4096  # more than anyone builds
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,10 @@ class BlockConfig:
     def __post_init__(self) -> None:
         within = 1 <= self.length <= MOST_FRAMES and 1 <= self.dilation <= MOST_FRAMES and 1 <= self.nodes <= MOST_NODES
         if not within or not 0 <= self.dropout < 1:
-            raise ValueError(f"{self} cannot be built: give numbers from 1, and a dropout from 0 to less than 1")
+            raise ValueError(
+                f"{self} cannot be built: give 1 to {MOST_NODES} nodes, length and dilation from 1 to {MOST_FRAMES}, "
+                "and a dropout from 0 to less than 1"
+            )
 
     @property
     def span(self) -> int:
@@ -52,8 +55,12 @@ class PerceptionConfig:
     center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
 
     def __post_init__(self) -> None:
-        if not 0 < self.width <= MOST_WIDTH or min(self.image_width, self.image_height) < 1:
-            raise ValueError("a network's width or its image's size cannot be built: give numbers over 0")
+        sides = self.image_width, self.image_height
+        if not 0 < self.width <= MOST_WIDTH or not all(1 <= side <= MOST_PIXELS for side in sides):
+            raise ValueError(
+                f"a network of width {self.width} for {sides[0]} x {sides[1]} pixels cannot be built: give more than 0 "
+                f"and up to {MOST_WIDTH:g} as its width, and 1 to {MOST_PIXELS} pixels a side"
+            )
 
 
 PERCEPTIONS = {

@@ -40,7 +40,7 @@ def repeated(episodes: Sequence[Episode]) -> list[str]:
     first = {episode.key: episode for episode in reversed(episodes)}
     again = [episode for episode in episodes if first[episode.key] is not episode]
     return [
-        f"{one.path} is the episode of {first[one.key].path} again: remove one, or record with another --seed"
+        f"{one.path} has id, town, weather and seed of {first[one.key].path}: keep one, or record with another --seed"
         for one in again
     ]
 

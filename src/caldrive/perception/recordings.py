@@ -31,7 +31,8 @@ HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
 @dataclass(frozen=True)
 class Recording:
     """What lies in a folder. minutes: simulated; weathers: episodes by weather; counts: frames by label and value;
-    damaged: a sentence for each file that is no use; missing: episodes that were asked for and are not there."""
+    damaged: a sentence for each file that is no use, or no use beside the others; missing: episodes that were asked for
+    and are not there."""
 
     episodes: int
     frames: int
@@ -67,13 +68,13 @@ def _missing(manifest: Path) -> int:
 
 
 def _of_another_size(episodes: list[Episode]) -> list[str]:
-    """A sentence for each episode whose images are not as large as the first one's."""
+    """A sentence for each episode whose images are not as large as most are."""
     sizes = [episode.image(0).shape[:2] for episode in episodes]
+    (height, width), _ = Counter(sizes).most_common(1)[0] if sizes else ((0, 0), 0)
     return [
-        f"{episode.path} has images of {size[1]} x {size[0]}, {episodes[0].path} of {sizes[0][1]} x {sizes[0][0]}: "
-        "keep one size in a folder"
-        for episode, size in zip(episodes, sizes, strict=True)
-        if size != sizes[0]
+        f"{episode.path} has images of {w} x {h}, most have {width} x {height}: keep one size in a folder"
+        for episode, (h, w) in zip(episodes, sizes, strict=True)
+        if (h, w) != (height, width)
     ]
 
 

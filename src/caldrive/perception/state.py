@@ -13,6 +13,7 @@ from caldrive.perception.optimisation import TrainingRun
 from caldrive.typed import as_type
 
 KIND = "training"
+ADAM = {"step", "exp_avg", "exp_avg_sq"}  # what it knows of a parameter
 FREE = ("initial", "evaluate_every", "save_every", "cache_gb", "device")  # may change while a training is under way
 
 
@@ -91,8 +92,9 @@ def _take(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> None:
     for path, value in _under("optimizer.", tensors).items():
         number, name = path.split(".")
         states.setdefault(int(number), {})[name] = value
-    if header["step"] and not states:
-        raise ValueError("without the optimizer's tensors")
+    whole = all(state.keys() == ADAM for state in states.values())
+    if not whole or (header["step"] and not states):
+        raise ValueError("without all of the optimizer's tensors")
     groups = run.optimizer.state_dict()["param_groups"]
     run.optimizer.load_state_dict({"state": states, "param_groups": groups})
     run.step = header["step"]

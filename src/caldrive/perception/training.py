@@ -51,6 +51,10 @@ def _row(line: bytes) -> Row:
     return row
 
 
+def _write_rows(out: Path, rows: list[Row]) -> None:
+    write_whole(out / METRICS, "".join(json.dumps(row) + "\n" for row in rows).encode())
+
+
 def validate(run: TrainingRun, held: Frames, model: Path, context: int) -> Row:
     """Write the network as it is, in 16 bits, with its validation metrics, and return them as `validation/<name>`.
 
@@ -130,6 +134,7 @@ def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: B
         forget_features(out)
         return
     if not there:
+        _write_rows(out, rows)  # else those of its blocks' lesson would speak for a network that had none yet
         validate(run, held, out / MODEL, run.context)
     if not _looks_back(run):
         return
@@ -143,7 +148,7 @@ def _finish(run: TrainingRun, held: Frames, out: Path, rows: list[Row], board: B
     rows[-1] |= validate(run, held, out / MODEL, run.network.span - 1)
     board.add(rows[-1])
     draw_curves(rows, out / CURVES)
-    write_whole(out / METRICS, "".join(json.dumps(row) + "\n" for row in rows).encode())
+    _write_rows(out, rows)
     forget_features(out)
 
 
@@ -166,6 +171,6 @@ def _step(run: TrainingRun, held: Frames, out: Path, rows: list[Row]) -> Row:
             draw_curves([*rows, row], out / CURVES)
         run.team.wait()
     if run.team.leads and (last or run.step % config.save_every == 0):
-        write_whole(out / METRICS, "".join(json.dumps(r) + "\n" for r in [*rows, row]).encode())
+        _write_rows(out, [*rows, row])
         save_state(out / STATE, run)
     return row
