@@ -118,8 +118,8 @@ def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> No
         ({"weather": 99}, "found weather 99"),
         ({"town": "town09"}, "found town 'town09'"),
         ({"start": Pose(-900, 0, 0)}, "found no lane"),
-        ({"n_vehicles": 900}, "n_vehicles is 900, but town"),
-        ({"n_pedestrians": 90_000}, "n_pedestrians is 90000, but town"),
+        ({"n_vehicles": 900}, "found 900 cars asked for, but town"),
+        ({"n_pedestrians": 90_000}, "found 90000 people asked for, but town"),
     ],
 )
 def test_a_trial_that_cannot_be_is_named_before_there_is_a_folder(

@@ -131,7 +131,7 @@ def test_counts_of_other_classes_are_refused(classes: dict[str, Any], network: N
 def test_a_header_of_nothing_is_foreign(tmp_path: Path) -> None:
     text = b'{"__metadata__":null}  '
     (tmp_path / "model.safetensors").write_bytes(len(text).to_bytes(8, "little") + text)
-    with pytest.raises(CheckpointError, match=r"no network of caldrive|damaged"):
+    with pytest.raises(CheckpointError, match=r"no network of caldrive"):
         load_network(tmp_path / "model.safetensors")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 KMH = 1 / 3.6  # m/s in a km/h
+MOST_PIXELS = 4096  # a side of an image
 
 
 @dataclass(frozen=True)

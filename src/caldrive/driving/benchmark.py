@@ -24,9 +24,10 @@ from caldrive.driving.suites import SUITES, Driven, Trial, suite
 from caldrive.driving.trace import result_from_values
 from caldrive.driving.worker import TrialRecord, drive_trial
 from caldrive.files import write_whole
-from caldrive.world import pedestrians, traffic
+from caldrive.world.pedestrians import require_room
 from caldrive.world.route import plan_route
 from caldrive.world.towns import load_town
+from caldrive.world.traffic import free_places
 from caldrive.world.weather import weather
 
 
@@ -95,11 +96,9 @@ def _check_places(suite: str, trials: list[Trial]) -> None:
 def _check_place(scenario: Scenario) -> None:
     weather(scenario.weather)
     roads = load_town(scenario.town)
-    plan_route(roads, scenario.start, scenario.goal)
-    asked = {"n_vehicles": scenario.n_vehicles, "n_pedestrians": scenario.n_pedestrians}
-    for name, most in {"n_vehicles": traffic.room(roads), "n_pedestrians": pedestrians.room(roads)}.items():
-        if asked[name] > most:
-            raise ValueError(f"{name} is {asked[name]}, but {scenario.town} has room for {most}")
+    route = plan_route(roads, scenario.start, scenario.goal)
+    free_places(roads, scenario.n_vehicles, route.line.pose_at(0.0))
+    require_room(roads, scenario.n_pedestrians)
 
 
 def _benchmark(

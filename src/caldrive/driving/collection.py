@@ -13,9 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from caldrive.config import CollectConfig
+from caldrive.config import MOST_PIXELS, CollectConfig
 from caldrive.driving.ledger import code_version
-from caldrive.driving.limits import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
+from caldrive.driving.limits import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.pool import spread
 from caldrive.driving.recorder import record_episode
 from caldrive.episodes import FORMAT_VERSION, MANIFEST, episode_path

@@ -6,7 +6,6 @@ import math
 
 MOST_SEED = 2**31 - 1  # a million times as much is still a seed for torch
 MOST_WORKERS = 1024
-MOST_PIXELS = 4096
 
 
 def require_within(option: str, value: float, low: float, high: float, usual: float) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from PIL import Image as Picture
 
-from caldrive.driving.limits import MOST_PIXELS, require_within
+from caldrive.config import MOST_PIXELS
+from caldrive.driving.limits import require_within
 from caldrive.driving.outputs import require_writable_file
 from caldrive.files import write_whole
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MOST_FRAMES, MOST_NODES, MOST_WIDTH, MOST_PIXELS = 1000, 10_000, 10.0, 4096  # more than anyone builds
+from caldrive.config import MOST_PIXELS
+
+MOST_FRAMES, MOST_NODES, MOST_WIDTH = 1000, 10_000, 10.0  # more than anyone builds
 
 
 @dataclass(frozen=True)

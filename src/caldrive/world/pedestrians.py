@@ -112,16 +112,21 @@ def room(roads: RoadNetwork) -> int:
     return int(find_walks(roads).lengths.sum() / SPACE_PER_PERSON)
 
 
+def require_room(roads: RoadNetwork, n: int) -> None:
+    """Raises ValueError for more people than there is room for."""
+    if n > room(roads):
+        raise ValueError(
+            f"found {n} people asked for, but {roads.name} has room for {room(roads)}: ask for fewer with --people"
+        )
+
+
 class Pedestrians:
     """n people, all random choices from one generator. Raises ValueError for more people than sidewalks hold."""
 
     def __init__(self, roads: RoadNetwork, n: int, rng: np.random.Generator, crossing: float = 1.0) -> None:
         self.walks, self.rng, self.rate = find_walks(roads), rng, crossing / MEAN_WALK_BETWEEN_CROSSINGS
         lengths = self.walks.lengths
-        if n > room(roads):
-            raise ValueError(
-                f"found {n} people asked for, but {roads.name} has room for {room(roads)}: ask for fewer with --people"
-            )
+        require_room(roads, n)
         self.n = n
         self.names = [f"person{k}" for k in range(n)]
         self.loop = rng.choice(len(lengths), size=n, p=lengths / lengths.sum())

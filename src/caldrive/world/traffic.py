@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 
 import libsumo
@@ -34,13 +33,26 @@ def places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
     return [(lane, float(s)) for lane in roads.driveable for s in np.arange(SPACING, lane.line.length - 2.0, SPACING)]
 
 
-@lru_cache(maxsize=8)
 def room(roads: RoadNetwork) -> int:
     """How many cars a town holds, wherever the ego stands."""
     here = np.array([(pose.x, pose.y) for pose in (lane.line.pose_at(s) for lane, s in places(roads))]).reshape(-1, 2)
     apart = np.linalg.norm(here[:, None] - here[None], axis=-1)
     near = (apart <= CLEAR_OF_EGO + SPACING / 2).sum(axis=1)  # the ego may stand between two places
     return len(here) - int(near.max(initial=0))
+
+
+def free_places(roads: RoadNetwork, n: int, ego: Pose) -> list[tuple[Lane, float]]:
+    """Where a car may stand at the start, away from the ego. Raises ValueError where there is no room for n."""
+    free = []
+    for lane, s in places(roads):
+        here = lane.line.pose_at(s)
+        if math.hypot(here.x - ego.x, here.y - ego.y) > CLEAR_OF_EGO:
+            free.append((lane, s))
+    if n > len(free):
+        raise ValueError(
+            f"found {n} cars asked for, but {roads.name} has room for {len(free)}: ask for fewer with --cars"
+        )
+    return free
 
 
 class Traffic:
@@ -78,15 +90,7 @@ class Traffic:
 
     def _places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
         """Random free places for n cars, away from the ego."""
-        free = []
-        for lane, s in places(self.roads):
-            here = lane.line.pose_at(s)
-            if math.hypot(here.x - ego.pose.x, here.y - ego.pose.y) > CLEAR_OF_EGO:
-                free.append((lane, s))
-        if n > len(free):
-            raise ValueError(
-                f"found {n} cars asked for, but {self.roads.name} has room for {len(free)}: ask for fewer with --cars"
-            )
+        free = free_places(self.roads, n, ego.pose)
         return [free[int(i)] for i in self.rng.permutation(len(free))[:n]]
 
     def _walk(self, edge: str, steps: int = 30) -> list[str]:
