@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.config import MOST_PIXELS, CollectConfig
-from caldrive.driving.ledger import code_version
 from caldrive.driving.limits import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.driving.pool import spread
 from caldrive.driving.recorder import record_episode
 from caldrive.episodes import FORMAT_VERSION, MANIFEST, episode_path
 from caldrive.files import write_whole
 from caldrive.progress import Progress, silent
+from caldrive.provenance import code_version
 from caldrive.typed import read_json
 from caldrive.world import pedestrians, traffic
 from caldrive.world.embedded import EmbeddedWorld

@@ -15,7 +15,6 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -24,10 +23,10 @@ from caldrive.driving.settings import BenchmarkSettings, DriverSettings
 from caldrive.driving.suites import SUITES, from_json
 from caldrive.driving.trace import json_line, result_from_values
 from caldrive.files import write_whole
+from caldrive.provenance import code_version
 from caldrive.typed import read_json
 from caldrive.world.towns import TOWNS
 
-PACKAGE = Path(__file__).parents[1]
 RESULTS, RUN = "results.jsonl", "run.json"
 
 
@@ -56,16 +55,6 @@ class Line(TypedDict):
     key: str
     result: dict[str, Any]
     figures: dict[str, int | float | None]
-
-
-@lru_cache(maxsize=1)
-def code_version() -> str:
-    """Tells this code from any other: a digest of all sources and data of the package, its models left aside."""
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*")):
-        if path.is_file() and path.suffix not in (".pyc", ".safetensors"):
-            digest.update(str(path.relative_to(PACKAGE)).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _digest(path: Path | None) -> str | None:
