@@ -31,7 +31,7 @@ model: $(READY)
 	step data $(MODEL)/recording --picture $(MODEL)/recording.png; \
 	step train --data $(MODEL)/recording --out $(MODEL)/training; \
 	step evaluate --data $(MODEL)/recording --model $(MODEL)/training/model.safetensors --held-out --worst $(MODEL)/worst.png; \
-	step collect --out $(MODEL)/elsewhere --town town02 --weathers 4 14 --episodes 60 --cars 15 --people 50 --rearranged 0; \
+	step collect --out $(MODEL)/elsewhere --town town02 --weathers 4 14 --episodes 60 --cars 15 --people 50 --randomised 0; \
 	step evaluate --data $(MODEL)/elsewhere --model $(MODEL)/training/model.safetensors; \
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt

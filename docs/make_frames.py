@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, FancyArrowPatch, FancyBboxPatch, Polygon, Rectangle
 from matplotlib.transforms import Affine2D, Transform
 
-from caldrive.config import CameraConfig, VehicleConfig
-from caldrive.datatypes import Pose
+from caldrive.datatypes import CameraConfig, Pose
 from caldrive.geometry import Polyline, moved
-from caldrive.world.labels import A1, A2, A3, Area
-from caldrive.world.plans import LANE_WIDTH
-from caldrive.world.roads import POST_BESIDE_LANE
+from caldrive.world.roads.network import POST_BESIDE_LANE
+from caldrive.world.roads.plans import LANE_WIDTH
+from caldrive.world.traffic.ego import VehicleConfig
+from caldrive.world.truth.labels import A1, A2, A3, Area
 
 CAR, CAMERA = VehicleConfig(), CameraConfig()
 BUMPER = CAR.length / 2 - CAR.front_axle

@@ -7,39 +7,39 @@ from pathlib import Path
 
 import pytest
 
-from caldrive.driving import worker
-from caldrive.perception.dataset import Frames
-from caldrive.perception.folders import find_episodes
-from caldrive.world.camera import Camera
-from caldrive.world.roads import RoadNetwork
-from caldrive.world.scenery import build_scenery
-from caldrive.world.towns import TOWNS, load_town
-from caldrive.world.traffic import stop_sumo
-from tests.perception_data import HEIGHT, WIDTH, record
+from caldrive.benchmark import runner
+from caldrive.perception.dataset.frames import Frames
+from caldrive.recordings.folder import find_episodes
+from caldrive.world.rendering.camera import CameraRig
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.towns import TOWNS, load_roads
+from caldrive.world.town import load_town
+from caldrive.world.traffic.vehicles import stop_sumo
+from tests.perception.data import HEIGHT, WIDTH, record
 
 
 @pytest.fixture(scope="session")
 def town01() -> RoadNetwork:
-    return load_town("town01")
+    return load_roads("town01")
 
 
 @pytest.fixture(scope="session")
 def town02() -> RoadNetwork:
-    return load_town("town02")
+    return load_roads("town02")
 
 
 @pytest.fixture(scope="session", params=TOWNS)
 def town(request: pytest.FixtureRequest) -> RoadNetwork:
     """Each of the package's towns."""
-    return load_town(request.param)
+    return load_roads(request.param)
 
 
 @pytest.fixture
 def fresh_worker() -> Iterator[None]:
     """The test begins like a benchmark's new worker and leaves nothing running."""
-    worker._set_up.cache_clear()
+    runner._set_up.cache_clear()
     yield
-    worker._set_up.cache_clear()
+    runner._set_up.cache_clear()
     stop_sumo()
 
 
@@ -55,8 +55,8 @@ def frames(folder: Path) -> Frames:
 
 
 @pytest.fixture(scope="module")
-def camera(roads: RoadNetwork) -> Iterator[Camera]:
-    """The camera of the town that a test file calls `roads`."""
-    made = Camera(roads, build_scenery(roads))
-    yield made
-    made.close()
+def camera(roads: RoadNetwork) -> Iterator[CameraRig]:
+    """The camera rig of the town that a test file calls `roads`."""
+    rig = CameraRig(load_town(roads.name))
+    yield rig
+    rig.close()

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from caldrive.config import KMH, VehicleConfig
 from caldrive.datatypes import (
+    KMH,
     Command,
     Control,
     LightState,
@@ -17,15 +17,15 @@ from caldrive.datatypes import (
     PedestrianState,
     Points,
     Pose,
-    Scenario,
     Sign,
     TrafficLight,
     Truth,
     VehicleState,
 )
 from caldrive.geometry import Polyline, moved
-from caldrive.world.labels import label
-from caldrive.world.vehicle import EgoState, advance
+from caldrive.scenarios import Scenario
+from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
+from caldrive.world.truth.labels import label
 
 CAR = VehicleConfig()
 POST_BEHIND_LINE = 6.6  # m from the stop line to the light's post: the bumper is there when the post leaves A1

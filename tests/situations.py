@@ -17,23 +17,24 @@ from typing import Any
 
 import numpy as np
 
-from caldrive.config import CameraConfig, CollectConfig
-from caldrive.control.controller import Controller
+from caldrive.agents.cal import CALAgent, OraclePerception
+from caldrive.agents.registry import SHIPPED_MODEL
+from caldrive.benchmark.behaviour import Behaviour
+from caldrive.benchmark.suites import SUITES, suite, to_json
+from caldrive.collection.config import CollectConfig
+from caldrive.collection.recorder import record_episode
+from caldrive.control.controller import CALController
 from caldrive.control.presets import PAPER
-from caldrive.datatypes import Control, Observation, Scenario, Step
-from caldrive.driving.agent import CALAgent, OraclePerception
-from caldrive.driving.behaviour import Behaviour
-from caldrive.driving.drivers import SHIPPED_MODEL
-from caldrive.driving.recorder import record_episode
+from caldrive.datatypes import CameraConfig, Control, Observation, Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
-from caldrive.driving.suites import SUITES, suite, to_json
 from caldrive.driving.tasks import scenarios
-from caldrive.driving.trace import result_values
-from caldrive.episode_reader import read_episode
 from caldrive.interfaces import Agent
-from caldrive.perception.predictor import NetworkPerception
+from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.provenance import BEHAVIOUR_VERSION
+from caldrive.recordings.reader import read_episode
+from caldrive.results import result_values
+from caldrive.scenarios import Scenario
 from caldrive.world.embedded import EmbeddedWorld
 
 KEPT = Path(__file__).parent / "situations.json"
@@ -88,8 +89,8 @@ def limited(town: str, task: str, number: int, weather: int = 6, **traffic: int)
 def drives() -> Numbers:
     """The oracle in traffic under both controllers, and a driver who hits things."""
     with closing(EmbeddedWorld()) as world:
-        oracle = CALAgent(OraclePerception(world.truth), Controller())
-        by_paper = CALAgent(OraclePerception(world.truth), Controller(PAPER))
+        oracle = CALAgent(OraclePerception(world.truth), CALController())
+        by_paper = CALAgent(OraclePerception(world.truth), CALController(PAPER))
         return {
             "oracle, town01": driven(world, oracle, limited("town01", "navigation-dynamic", 3)),
             "oracle, town02": driven(world, oracle, limited("town02", "navigation", 7, cars=30, people=100)),

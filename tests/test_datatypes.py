@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, DriveState, Pose
+from caldrive.control.longitudinal import DriveState
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Affordances, Control, Pose
 from caldrive.results import Outcome
 
 
@@ -40,7 +41,7 @@ def test_values_are_frozen_hashable_and_travel_between_processes() -> None:
 
 def test_states_are_in_ascending_importance() -> None:
     names = [state.value for state in DriveState]
-    assert names == ["cruising", "following", "over limit", "red light", "hazard stop", "blind"]
+    assert names == ["cruising", "following", "over limit", "red light", "hazard stop", "creeping", "blind"]
 
 
 def test_outcomes_read_as_messages() -> None:

@@ -22,7 +22,7 @@ MISTAKES = {
     "unknown weather": ([*DRIVE, "--weather", "15"], "wanted 1 to 14"),
     "unknown task": ([*DRIVE, "--task", "swim"], "wanted one of straight"),
     "unknown agent": ([*DRIVE, "--agent", "bob"], "wanted one of cal, oracle"),
-    "unknown preset": ([*DRIVE, "--preset", "wild"], "wanted one of default, paper"),
+    "unknown controller": ([*DRIVE, "--controller", "wild"], "wanted one of default, paper"),
     "too many cars": ([*DRIVE, "--cars", "9999"], "ask for fewer with --cars"),
     "too many people": ([*DRIVE, "--people", "99999"], "ask for fewer with --people"),
     "less than no car": ([*DRIVE, "--cars", "-1"], "type --cars 0"),
@@ -39,7 +39,7 @@ MISTAKES = {
     "unknown town, timed": (["speed", "world", "--town", "mars"], "--town town01"),
     "sheet of no kind": (["town", "--sheet", "{tmp}/town.jpg"], "wanted a name that ends in .png"),
     "sheet of no size": (["town", "--sheet", "{tmp}/town.png", "--width", "0"], "wanted 16 to 16384"),
-    "sheet of too many looks": (["town", "--sheet", "{tmp}/town.png", "--looks", "-1"], "wanted 0 to 100"),
+    "sheet of too many looks": (["town", "--sheet", "{tmp}/town.png", "--randomised", "-1"], "wanted 0 to 100"),
     "a damaged episode, to learn from": (["train", "--data", "{tmp}/damaged", "--out", "{tmp}"], "record again"),
     "a damaged episode, to evaluate": (["evaluate", "--data", "{tmp}/damaged"], "record again"),
     "no episode to learn from": (["train", "--data", "{tmp}/folder.png", "--out", "{tmp}"], "caldrive collect"),
@@ -110,7 +110,7 @@ def test_damaged_files_are_named_one_by_one(folder: Path, capsys: pytest.Capture
 def test_cal_without_a_model_says_what_else_to_type(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from caldrive.driving import drivers
+    from caldrive.agents import registry as drivers
 
     monkeypatch.setattr(drivers, "SHIPPED_MODEL", folder / "gone.safetensors")
     assert main(["drive"]) == 2

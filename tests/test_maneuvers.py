@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from caldrive.config import KMH
-from caldrive.control.controller import Controller
+from caldrive.agents.cal import CALAgent, OraclePerception
+from caldrive.control.controller import CALController
+from caldrive.control.longitudinal import DriveState
 from caldrive.control.presets import DEFAULT
-from caldrive.datatypes import Command, DriveState, Pose, Scenario, Step
-from caldrive.driving.agent import CALAgent, OraclePerception
+from caldrive.datatypes import KMH, Command, Pose, Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import rollout
 from caldrive.results import InfractionKind
+from caldrive.scenarios import Scenario
 from tests.fakes import CAR, StraightRoad, turn_route
 
 ORIGIN = Pose(0, 0, 0)
@@ -56,7 +57,7 @@ class Drive:
 
 
 def drive(world: StraightRoad, seconds: float, cap: float | None, limit: float, start: Pose) -> Drive:
-    controller = Controller(replace(DEFAULT, cap=cap, initial_limit=limit), world.dt)
+    controller = CALController(replace(DEFAULT, cap=cap, initial_limit=limit), world.dt)
     agent = CALAgent(OraclePerception(world.truth), controller)
     scenario = Scenario("straight", 1, start, Pose(1e6, 0, 0), time_limit=seconds)
     referee, steps = Referee(scenario), []

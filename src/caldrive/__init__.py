@@ -3,10 +3,10 @@
 One loop carries everything. A world shows an image, an agent turns it into six affordances and those into a control,
 the world moves on, and a referee who knows the truth writes down how it went:
 
-    from caldrive import CALAgent, Controller, EmbeddedWorld, OraclePerception, run_episode, scenarios
+    from caldrive import CALAgent, CALController, EmbeddedWorld, OraclePerception, run_episode, scenarios
 
     world = EmbeddedWorld()                                    # EmbeddedWorld(CameraConfig()) for images
-    agent = CALAgent(OraclePerception(world.truth), Controller())
+    agent = CALAgent(OraclePerception(world.truth), CALController())
     for scenario in scenarios("town01", "navigation-dynamic"):
         print(run_episode(world, agent, scenario).outcome)
 
@@ -22,20 +22,20 @@ __version__ = "0.1.0"
 
 # Loaded when first asked for, so that `caldrive --help` waits for neither torch nor SUMO.
 _HOMES = {
-    "caldrive.config": ("CameraConfig", "ControlConfig"),
-    "caldrive.control.controller": ("Controller",),
+    "caldrive.agents.cal": ("CALAgent", "OraclePerception"),
+    "caldrive.control.controller": ("ControlConfig", "CALController"),
     "caldrive.datatypes": (
-        *("Affordances", "Command", "Control", "Observation"),
-        *("Pose", "Scenario", "Step", "Truth"),
+        *("Affordances", "CameraConfig", "Command", "Control", "Decision", "Observation"),
+        *("Pose", "Step", "Truth"),
     ),
-    "caldrive.driving.agent": ("CALAgent", "OraclePerception"),
     "caldrive.driving.drive": ("drive",),
     "caldrive.driving.referee": ("Referee",),
     "caldrive.driving.rollout": ("rollout", "run_episode"),
     "caldrive.driving.settings": ("DriveSettings",),
     "caldrive.driving.tasks": ("scenarios",),
-    "caldrive.perception.predictor": ("NetworkPerception",),
+    "caldrive.perception.inference.predictor": ("NetworkPerception",),
     "caldrive.results": ("EpisodeResult", "Outcome"),
+    "caldrive.scenarios": ("Scenario",),
     "caldrive.world.embedded": ("EmbeddedWorld",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

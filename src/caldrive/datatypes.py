@@ -7,15 +7,16 @@ Speeds on signs are the one exception: they are the km/h that stand on the sign.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
-from enum import Enum
+from dataclasses import dataclass
+from enum import Enum, IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+KMH = 1 / 3.6  # m/s in a km/h
+DT = 0.1  # s between two controls, 10 Hz (section 4)
 Image = NDArray[np.uint8]  # (H, W, 3), RGB
 Points = NDArray[np.float64]  # (N, 2), metres
-
 SPEED_SIGNS = (30, 60, 90)  # km/h
 MAX_VEHICLE_DISTANCE = 50.0  # m, also the value for "no vehicle ahead" (Fig. 3 of the paper)
 MAX_CENTER_DISTANCE = 2.0  # m
@@ -40,17 +41,6 @@ class ContactKind(Enum):
     OBJECT = "object"
     CAR = "car"
     PERSON = "person"
-
-
-class DriveState(Enum):
-    """States of the longitudinal controller in ascending importance (section 3.2), and a last resort."""
-
-    CRUISING = "cruising"
-    FOLLOWING = "following"
-    OVER_LIMIT = "over limit"
-    RED_LIGHT = "red light"
-    HAZARD_STOP = "hazard stop"
-    BLIND = "blind"
 
 
 @dataclass(frozen=True)
@@ -146,6 +136,27 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class CameraConfig:
+    """A pinhole camera on the car. The default is the authors' 800 x 600 camera with rows 120 to 480 kept, drawn
+    straight at the network's size."""
+
+    width: int = 200
+    """Pixels."""
+    height: int = 88
+    """Pixels."""
+    fov: float = 90.0
+    """Horizontal field of view, degrees."""
+    forward: float = 1.44
+    """m ahead of the car's centre."""
+    left: float = 0.0
+    """m to its left."""
+    up: float = 1.2
+    """m above the ground."""
+    yaw: float = 0.0
+    """rad to the left."""
+
+
+@dataclass(frozen=True)
 class Observation:
     """All that an agent may see: time (s), image (H, W, 3), speed (m/s) and the command."""
 
@@ -189,40 +200,14 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Scenario:
-    """One episode's conditions. town: a name or the path of an .xodr file. time_limit in s. crossing: how many times
-    as often as usual pedestrians cross."""
-
-    town: str
-    weather: int
-    start: Pose
-    goal: Pose
-    n_vehicles: int = 0
-    n_pedestrians: int = 0
-    time_limit: float = math.inf
-    seed: int = 0
-    task: str = ""
-    crossing: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name in ("n_vehicles", "n_pedestrians", "seed", "crossing"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} is {getattr(self, name)}, but must be 0 or more: give a scenario that can be")
-        if not self.time_limit > 0:
-            raise ValueError(f"time_limit is {self.time_limit}, but must be more than 0 s: give it some time")
-        if not all(math.isfinite(value) for pose in (self.start, self.goal) for value in astuple(pose)):
-            raise ValueError(f"start or goal of {self.town} is no place: give x, y and heading as numbers")
-
-
-@dataclass(frozen=True)
 class Decision:
-    """Why a control was chosen: the affordances it rests on, the state, limit and target in km/h, a note if any."""
+    """Why a control was chosen, as far as the agent says: what it saw, its state, limit and target in km/h, a note."""
 
     control: Control
-    affordances: Affordances
-    state: DriveState
-    speed_limit: float
-    target_speed: float
+    affordances: Affordances | None = None
+    state: str | None = None
+    speed_limit: float | None = None
+    target_speed: float | None = None
     note: str = ""
 
 
@@ -234,3 +219,20 @@ class Step:
     truth: Truth
     control: Control
     decision: Decision | None = None
+
+
+class Semantic(IntEnum):
+    """Classes of pixels, as numbers in a recording."""
+
+    SKY = 0
+    ROAD = 1
+    LINE = 2
+    SIDEWALK = 3
+    GROUND = 4
+    BUILDING = 5
+    PLANT = 6
+    FURNITURE = 7
+    LIGHT = 8
+    SIGN = 9
+    VEHICLE = 10
+    PERSON = 11

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
+import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -29,3 +36,60 @@ def write_figure(path: Path, figure: Any, dpi: int = 90) -> None:
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=dpi)
     write_whole(path, content.getvalue())
+
+
+def json_line(values: dict[str, Any]) -> bytes:
+    """Values in JSON's types as one line."""
+    return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
+T = TypeVar("T")
+
+
+def read_json(text: bytes | str, kind: type[T]) -> T:
+    """What a JSON text says, as a plain type, a TypedDict or a dataclass.
+
+    Raises ValueError with the place where it says something else. NaN and Infinity are no JSON.
+    """
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except RecursionError as error:
+        raise ValueError("it is nested too deep") from error
+
+
+def as_type(values: Any, kind: type[T]) -> T:
+    """What JSON's values say, as in `read_json`. A dataclass, and those within it, are refused values that are none of
+    their fields."""
+    found = msgspec.convert(values, kind)
+    if is_dataclass(found) and (unknown := _unknown(values, msgspec.to_builtins(found))):
+        raise ValueError(f"{unknown[0]} is none of the fields of {kind.__name__}")
+    return found
+
+
+def _unknown(values: Any, known: Any) -> list[str]:
+    """Names in nested dictionaries that others do not have."""
+    if not isinstance(values, dict) or not isinstance(known, dict):
+        return []
+    within = (_unknown(value, known[name]) for name, value in values.items() if name in known)
+    return [name for name in values if name not in known] + [one for part in within for one in part]
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Keeps a folder for this process; two that write at once would lose lines. Raises ValueError where it is kept."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file = os.open(folder, os.O_RDONLY)
+    try:
+        _lock(file, folder)
+        yield
+    finally:
+        os.close(file)
+
+
+def _lock(file: int, folder: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise ValueError(
+            f"found another benchmark at work in {folder}, wanted it alone: wait for it, or give another --out"
+        ) from error

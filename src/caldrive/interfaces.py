@@ -1,10 +1,31 @@
-"""The three seams of caldrive: a world to drive in, a perception that looks, an agent that acts."""
+"""The seams of caldrive: a world to drive in, an agent that acts, and CAL's two halves, perception and controller.
+
+Whoever needs one names the protocol, never a class; `driving.setup.make_world` and `agents.registry` know the names.
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from inspect import getattr_static
+from typing import Any, Protocol, TypeGuard
 
-from caldrive.datatypes import Affordances, Control, Decision, Observation, Scenario, Truth
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.datatypes import (
+    Affordances,
+    Alternative,
+    CameraConfig,
+    Command,
+    Control,
+    Decision,
+    Image,
+    Observation,
+    Truth,
+)
+from caldrive.scenarios import Scenario
+
+TruthSource = Callable[[], Truth]
 
 
 class World(Protocol):
@@ -12,10 +33,68 @@ class World(Protocol):
 
     dt: float
 
-    def reset(self, scenario: Scenario) -> Observation: ...
-    def step(self, control: Control) -> Observation: ...
-    def truth(self) -> Truth: ...
-    def close(self) -> None: ...
+    def reset(self, scenario: Scenario) -> Observation:
+        """Start an episode. Raises ValueError or FileNotFoundError for a scenario that cannot be."""
+        ...
+
+    def step(self, control: Control) -> Observation:
+        """Move everything on by dt."""
+        ...
+
+    def truth(self) -> Truth:
+        """What really is, now."""
+        ...
+
+    def close(self) -> None:
+        """End the simulation."""
+        ...
+
+
+class MappedWorld(World, Protocol):
+    """A world whose map and route are known: for minimaps and places. Its types are those of `world.roads`."""
+
+    @property
+    def roads(self) -> Any: ...
+    @property
+    def route(self) -> Any: ...
+
+
+class RecordableWorld(MappedWorld, Protocol):
+    """A world that can be seen from anywhere on the car, with labels for each place: for films and recordings."""
+
+    def reset(self, scenario: Scenario, *, route: Any = None, appearance: int = 0) -> Observation:
+        """Start an episode, along a route of one's own and in a random look of the town where these are given."""
+        ...
+
+    def displace(self, left: float, turn: float) -> Observation:
+        """Put the ego some metres to the left and turn it (rad)."""
+        ...
+
+    def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
+        """What cameras on the ego see now, (H, W, 3) each."""
+        ...
+
+    def semantic_images(self, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
+        """The class of each pixel of `images`, (H, W) each, as numbers of `datatypes.Semantic`."""
+        ...
+
+    def labels_at(self, mount: CameraConfig) -> Affordances:
+        """The affordances of a car that stands where this camera looks from."""
+        ...
+
+    def other_commands_at(self, mount: CameraConfig) -> list[Alternative]:
+        """What the other commands that could be given would ask of such a car."""
+        ...
+
+
+def is_mapped(world: World) -> TypeGuard[MappedWorld]:
+    """Whether a world's map and route are known (asked without reading them, as there may be no episode yet)."""
+    return all(getattr_static(world, name, None) is not None for name in ("roads", "route"))
+
+
+def is_recordable(world: World) -> TypeGuard[RecordableWorld]:
+    """Whether a world can be seen from anywhere on the car."""
+    return is_mapped(world) and getattr_static(world, "images", None) is not None
 
 
 class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
@@ -23,16 +102,37 @@ class BadImage(ValueError):  # noqa: N818 (it is the image that is bad)
 
 
 class Perception(Protocol):
-    """Image to affordances. reset() starts an episode; predict raises BadImage where the image is no use."""
+    """Image to affordances."""
 
-    def reset(self) -> None: ...
-    def predict(self, observation: Observation) -> Affordances: ...
+    def reset(self) -> None:
+        """Start an episode."""
+        ...
+
+    def predict(self, observation: Observation) -> Affordances:
+        """The affordances of the newest image. Raises BadImage where it is no use."""
+        ...
+
+
+class Controller(Protocol):
+    """Affordances to control."""
+
+    def reset(self) -> None:
+        """Start an episode."""
+        ...
+
+    def step(self, affordances: Affordances, speed: float, command: Command) -> Decision:
+        """The control for the next step, with its reasons; speed in m/s."""
+        ...
 
 
 class Agent(Protocol):
-    """A driver. decision holds the reasons for the last control, where the agent has any."""
+    """A driver. It may also have an attribute `decision`, the reasons for the last control (a `Decision` or None), and
+    `camera`, the camera that it wants (a `CameraConfig`, or None where it looks at no image)."""
 
-    decision: Decision | None
+    def reset(self) -> None:
+        """Start an episode."""
+        ...
 
-    def reset(self) -> None: ...
-    def act(self, observation: Observation) -> Control: ...
+    def act(self, observation: Observation) -> Control:
+        """The control for this observation."""
+        ...

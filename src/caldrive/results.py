@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import Enum
+from typing import Any, Literal, TypedDict
 
-from caldrive.datatypes import Scenario
+from caldrive.datatypes import KMH
+from caldrive.files import as_type
+from caldrive.scenarios import Scenario, scenario_from_values, scenario_values
 
 
 class Outcome(Enum):
@@ -57,3 +60,55 @@ class EpisodeResult:
                 raise ValueError(f"{name} is {getattr(self, name)}, but must be 0 or more: look at how it was measured")
         if not (self.route_length > 0 and math.isfinite(self.route_done)):
             raise ValueError(f"{self.route_done} m of {self.route_length} m are no part of a route: look at its length")
+
+
+DIGITS = 4
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON knows it: rounded, and null where it is no number."""
+    if isinstance(value, float):
+        return round(value, DIGITS) if math.isfinite(value) else None
+    return value
+
+
+def mean_speed(result: EpisodeResult) -> float:
+    """km/h over the whole episode, stops included."""
+    return result.distance / result.duration / KMH if result.duration > 0 else 0.0
+
+
+class _Result(TypedDict):
+    """What `result_values` writes and is needed to make a result again."""
+
+    scenario: dict[str, Any]
+    outcome: Literal["success", "timeout", "failed", "aborted"]
+    duration: float
+    distance: float
+    route_done: float
+    route_length: float | None
+    infractions: tuple[Infraction, ...]
+    comfort: dict[str, float]
+
+
+def result_from_values(values: Any) -> EpisodeResult:
+    """The inverse of `result_values`, up to its rounding. Raises ValueError for what is no result."""
+    found = as_type(values, _Result)
+    length = math.inf if found["route_length"] is None else found["route_length"]
+    return EpisodeResult(
+        scenario_from_values(found["scenario"]), Outcome[found["outcome"].upper()], found["duration"],
+        found["distance"], found["route_done"], length, found["infractions"], found["comfort"],
+    )  # fmt: skip
+
+
+def result_values(result: EpisodeResult) -> dict[str, Any]:
+    """An EpisodeResult in JSON's types; mean_speed in km/h."""
+    broken = [asdict(one) | {"kind": one.kind.value} for one in result.infractions]
+    return {
+        "scenario": scenario_values(result.scenario),
+        "outcome": result.outcome.name.lower(),
+        "message": result.outcome.value,
+        "infractions": [{name: plain(value) for name, value in one.items()} for one in broken],
+        "comfort": {name: plain(value) for name, value in result.comfort.items()},
+        "mean_speed": plain(mean_speed(result)),
+        **{name: plain(getattr(result, name)) for name in ("duration", "distance", "route_done", "route_length")},
+    }

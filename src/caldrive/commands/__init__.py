@@ -10,10 +10,17 @@ from typing import Annotated
 from tyro.conf import subcommand
 
 from caldrive.commands.answer import Answer
-from caldrive.commands.benchmark import Benchmark, Replay, Report
-from caldrive.commands.driving import Determinism, Drive, Town
-from caldrive.commands.learning import Collect, Data, Evaluate, Train
+from caldrive.commands.benchmark import Benchmark
+from caldrive.commands.collect import Collect
+from caldrive.commands.data import Data
+from caldrive.commands.determinism import Determinism
+from caldrive.commands.drive import Drive
+from caldrive.commands.evaluate import Evaluate
+from caldrive.commands.replay import Replay
+from caldrive.commands.report import Report
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
+from caldrive.commands.town import Town
+from caldrive.commands.train import Train
 
 __all__ = ["Answer", "Command"]
 

@@ -9,18 +9,18 @@ from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
 from caldrive.progress import Progress
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WorldSpeed(WorldSpeedSettings, Output):
     def run(self, progress: Progress) -> Answer:
         from caldrive.driving.speed import measure_world
 
         speed = measure_world(self, progress)  # times the imports, too: nothing is loaded before it
-        from caldrive.driving.tables import world_table
+        from caldrive.commands.tables import world_table
 
         return Answer(asdict(speed), world_table(speed))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AgentSpeed(AgentSpeedSettings, Output):
     def run(self, progress: Progress) -> Answer:
         from caldrive.driving.speed import measure_agent

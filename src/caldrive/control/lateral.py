@@ -8,10 +8,26 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-from caldrive.config import LateralConfig
 from caldrive.control.pid import clip
 from caldrive.datatypes import Affordances, Command
+
+
+@dataclass(frozen=True)
+class LateralConfig:
+    """Constants of the Stanley law."""
+
+    left: tuple[float, float] = (0.5, 0.05)
+    """Gain in 1/s, and damping, where the command is left."""
+    right: tuple[float, float] = (1.0, 0.075)
+    """The same for right."""
+    straight: tuple[float, float] = (1.0, 0.1)
+    """The same for straight."""
+    speed_floor: float = 2.0
+    """m/s, the least speed that the law divides by."""
+    max_angle: float = 0.6109
+    """rad, the largest angle of the front wheels (35°)."""
 
 
 def stanley_angle(relative_angle: float, center_distance: float, speed: float, gain: float, floor: float) -> float:

@@ -8,25 +8,85 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from enum import StrEnum
 
-from caldrive.config import LongitudinalConfig
-from caldrive.control.pid import PIDState, clip, pid_step
-from caldrive.datatypes import Affordances, Command, DriveState
+from caldrive.control.pid import PIDGains, PIDState, clip, pid_step
+from caldrive.datatypes import Affordances, Command
 
-CAR_AS_HAZARD = 15.0  # m; a car that is a hazard is nearer, unless its middle lies beside A3
+
+class DriveState(StrEnum):
+    """States of the controller in ascending importance (section 3.2), then what `patience` adds, and a last resort."""
+
+    CRUISING = "cruising"
+    FOLLOWING = "following"
+    OVER_LIMIT = "over limit"
+    RED_LIGHT = "red light"
+    HAZARD_STOP = "hazard stop"
+    CREEPING = "creeping"
+    BLIND = "blind"
+
+
+@dataclass(frozen=True)
+class LongitudinalConfig:
+    """The five states' thresholds and laws; control/presets.py has the reasons."""
+
+    cruise: PIDGains = PIDGains(0.09, 0.02, 0.0, low=-0.3)
+    """Gains of cruising: error in km/h, output throttle, or brake where negative."""
+    follow: PIDGains = PIDGains(0.09, 0.01, 0.0)
+    """Gains of following a car."""
+    turn_reduction: float = 0.0
+    """km/h that the target in a turn lies under the limit."""
+    turn_speed: float = 15.0
+    """km/h, the most that a turn is taken with."""
+    follow_distance: float = 45.0
+    """m, from which on a car ahead is followed."""
+    follow_c: float = 3.0
+    """km/h per m, the slope of the car-following law."""
+    follow_d: float = 0.0
+    """The offset of the car-following law."""
+    follow_gap: float = 5.5
+    """m between standing cars, from bumper to bumper."""
+    over_limit_margin: float = 3.0
+    """km/h above the target from which the car brakes."""
+    over_limit_ratio: float = 0.0
+    """Brake for each v / v* above the limit (the paper's term)."""
+    over_limit_gain: float = 0.03
+    """Brake for each km/h above the safe speed."""
+    red_threshold: float = 0.5
+    """Probability from which a light counts as red."""
+    red_gain: float = 1.5
+    """Brake before a red light at 30 km/h, in proportion to the speed."""
+    red_floor: float = 0.8
+    """The least brake before a red light; it also holds the standing car."""
+    hazard_threshold: float = 0.4
+    """Probability from which a hazard counts."""
+    hold_speed: float = 1.0
+    """km/h, asked for and driven, below which the car is held by the brake."""
+    hold_brake: float = 0.3
+    """The brake that holds it."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the longitudinal law decides about.
+
+    speed and limit in km/h. ceiling: km/h that the target does not exceed, whatever the limit.
+    """
+
+    affordances: Affordances
+    speed: float
+    command: Command
+    limit: float
+    ceiling: float = math.inf
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What is carried from one step to the next: the last state, the PID of cruising or following, the seconds that
-    the car has stood before a hazard that is no car, and before a red light, and how often it rolled on before it."""
+    """What is carried from one step to the next: the last state, and the PID of cruising or following."""
 
     state: DriveState = DriveState.CRUISING
     pid: PIDState = field(default_factory=PIDState)
-    waited: float = 0.0
-    waited_red: float = 0.0
-    rolls: int = 0
 
 
 @dataclass(frozen=True)
@@ -73,36 +133,6 @@ def choose_state(affordances: Affordances, speed: float, target: float, config: 
     return DriveState.CRUISING
 
 
-def seconds_waited(seen: bool, waited: float, patience: float, standing: bool, dt: float) -> float:
-    """How long the car has stood before what it sees, or has crept on since it lost patience."""
-    return waited + dt if seen and (standing or waited >= patience) else 0.0
-
-
-def without_errors(
-    affordances: Affordances, speed: float, memory: Memory, dt: float, config: LongitudinalConfig
-) -> tuple[Affordances, Memory]:
-    """What to stop for: not for a hazard that is no car and stays for longer than any does; and before a light that
-    stays red for long the car rolls on a little, from where it may look otherwise, and waits anew, red_rolls times.
-
-    Returns the memory with the seconds waited, too; speed in km/h.
-    """
-    standing = speed < config.hold_speed
-    hazard = affordances.hazard_stop > config.hazard_threshold and affordances.vehicle_distance >= CAR_AS_HAZARD
-    red = affordances.red_light > config.red_threshold
-    waited = seconds_waited(hazard, memory.waited, config.hazard_patience, standing, dt)
-    waited_red = memory.waited_red
-    if red or not standing:  # a light that flickers before a standing car is still the same
-        waited_red = seconds_waited(red, waited_red, config.red_patience, standing, dt)
-    rolls = memory.rolls if red or standing else 0
-    if waited_red >= config.red_patience + config.red_roll:
-        waited_red, rolls = 0.0, rolls + 1
-    if waited >= config.hazard_patience:
-        affordances = replace(affordances, hazard_stop=0.0)
-    if waited_red >= config.red_patience and rolls < config.red_rolls:
-        affordances = replace(affordances, red_light=0.0)
-    return affordances, replace(memory, waited=waited, waited_red=waited_red, rolls=rolls)
-
-
 def over_limit_brake(speed: float, target: float, safe: float, config: LongitudinalConfig) -> float:
     """Brake in [0, 1]: ratio v / v* + gain (v - v_safe), where v_safe heeds a car ahead too; speeds in km/h.
 
@@ -141,26 +171,20 @@ def pid_effort(
     return effort, pid
 
 
-def longitudinal_step(
-    affordances: Affordances,
-    speed: float,
-    command: Command,
-    limit: float,
-    memory: Memory,
-    dt: float,
-    config: LongitudinalConfig,
-) -> Longitudinal:
-    """Throttle and brake for one step of dt seconds; speed and limit in km/h."""
-    target, seen = cruise_target(limit, command, config), affordances
-    affordances, memory = without_errors(seen, speed, memory, dt, config)
-    if affordances is not seen:
-        target = min(target, config.creep_speed)
-    state = choose_state(affordances, speed, target, config)
-    safe = target
-    if affordances.vehicle_distance < config.follow_distance:
-        safe = min(target, follow_target(affordances.vehicle_distance, limit, config))
+def safe_target(situation: Situation, config: LongitudinalConfig) -> tuple[float, float]:
+    """The target speed by limit and command, and the one that heeds the car ahead, too; km/h."""
+    target = min(cruise_target(situation.limit, situation.command, config), situation.ceiling)
+    distance = situation.affordances.vehicle_distance
+    if distance >= config.follow_distance:
+        return target, target
+    return target, min(target, follow_target(distance, situation.limit, config))
 
-    pid = PIDState()
+
+def longitudinal_step(situation: Situation, memory: Memory, dt: float, config: LongitudinalConfig) -> Longitudinal:
+    """Throttle and brake for one step of dt seconds."""
+    speed, pid = situation.speed, PIDState()
+    target, safe = safe_target(situation, config)
+    state = choose_state(situation.affordances, speed, target, config)
     if state is DriveState.HAZARD_STOP:
         target, effort = 0.0, -1.0
     elif state is DriveState.RED_LIGHT:
@@ -170,4 +194,4 @@ def longitudinal_step(
     else:
         target = safe
         effort, pid = pid_effort(state, speed, target, memory, dt, config)
-    return Longitudinal(max(effort, 0.0), max(-effort, 0.0), state, target, replace(memory, state=state, pid=pid))
+    return Longitudinal(max(effort, 0.0), max(-effort, 0.0), state, target, Memory(state, pid))

@@ -4,7 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from caldrive.config import PIDGains
+
+@dataclass(frozen=True)
+class PIDGains:
+    """Gains in parallel form, and the limits of the output."""
+
+    kp: float
+    """Output per unit of error."""
+    ki: float
+    """Output per unit of error and second."""
+    kd: float = 0.0
+    """Output per unit of error a second."""
+    low: float = -1.0
+    """The least output."""
+    high: float = 1.0
+    """The largest output."""
+    filter_time: float = 0.2
+    """s, the time constant of the low pass on the derivative."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Two controllers: PAPER as printed (section 3.2, supplement 1.2), and DEFAULT, which drives better.
+"""Controllers by name. Two presets: PAPER as printed (section 3.2, supplement 1.2), and DEFAULT, which drives better.
 
 Where DEFAULT differs, and why:
 
@@ -28,7 +28,18 @@ Where DEFAULT differs, and why:
 
 from __future__ import annotations
 
-from caldrive.config import ControlConfig, LongitudinalConfig, PIDGains
+from dataclasses import replace
+from pathlib import Path
+
+from caldrive.checks import require_within
+from caldrive.config import from_toml
+from caldrive.control.controller import CALController, ControlConfig
+from caldrive.control.longitudinal import LongitudinalConfig
+from caldrive.control.patience import PatienceConfig
+from caldrive.control.pid import PIDGains
+from caldrive.interfaces import Controller
+from caldrive.plugins import Plugin, from_entry_point, is_plugin, load_plugin, offered
+from caldrive.provenance import file_digest
 
 DEFAULT = ControlConfig()
 
@@ -47,10 +58,59 @@ PAPER = ControlConfig(
         red_gain=0.2,
         red_floor=0.0,
         hazard_threshold=0.7,
-        hazard_patience=float("inf"),
-        red_patience=float("inf"),
         red_threshold=0.9,
         hold_speed=0.0,
         hold_brake=0.0,
-    )
+    ),
+    patience=PatienceConfig(enabled=False),
 )
+
+PRESETS = {"default": DEFAULT, "paper": PAPER}
+GROUP = "caldrive.controllers"  # of entry points
+
+
+def controller_config(name: str, cap: float | None) -> ControlConfig:
+    """A preset's constants, or those of a TOML file over DEFAULT (over another preset where its first line says
+    preset = "paper"), with a cap in km/h.
+
+    Raises ValueError for an unknown preset, a file that cannot be used, or a cap that cannot be.
+    """
+    if cap is not None:
+        require_within("--cap", cap, 1.0, 200.0, 20)
+    config = PRESETS[name] if name in PRESETS else from_toml(Path(name), PRESETS, DEFAULT)
+    return replace(config, cap=cap) if cap is not None else config
+
+
+def make_controller(name: str, cap: float | None, dt: float) -> Controller:
+    """A controller by name: a preset, a .toml file, `package.module:Class`, `file.py:Class` or an entry point.
+
+    A class is given `cap` and `dt` where its maker has parameters of these names. Raises ValueError for what is none.
+    """
+    if name in PRESETS or name.endswith(".toml"):
+        return CALController(controller_config(name, cap), dt)
+    plugin = _plugin(name)
+    controller: Controller = plugin.build(cap=cap, dt=dt)
+    if not callable(getattr(controller, "step", None)):
+        raise ValueError(
+            f"found that {plugin.name} has no method step, wanted step(affordances, speed, command) that returns a "
+            "Decision: add it"
+        )
+    return controller
+
+
+def _plugin(name: str) -> Plugin:
+    plugin = load_plugin(name, "--controller") if is_plugin(name) else from_entry_point(GROUP, name)
+    if plugin is None:
+        known = ", ".join([*PRESETS, *offered(GROUP)])
+        raise ValueError(
+            f"found controller {name!r}, wanted one of {known}, a .toml file or your own class: "
+            "type --controller default, or --controller FILE.py:CLASS"
+        )
+    return plugin
+
+
+def controller_source(name: str) -> str | None:
+    """A digest of the file that a controller's constants or code come from; None for a preset."""
+    if name in PRESETS:
+        return None
+    return file_digest(Path(name)) if name.endswith(".toml") else _plugin(name).source

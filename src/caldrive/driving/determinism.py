@@ -51,11 +51,12 @@ class Comparison:
 
 def drive_and_digest(settings: DeterminismSettings) -> Digests:
     """Drive the scenario in this process, with the camera on."""
-    from caldrive.driving.drivers import chosen_scenarios, set_up
+    from caldrive.driving.choice import chosen_scenarios
     from caldrive.driving.rollout import run_episode
+    from caldrive.driving.setup import set_up
 
     [scenario] = chosen_scenarios(settings, 1)
-    world, agent = set_up(settings, images=True)
+    world, agent = set_up(settings, settings.world, images=True)
     steps: list[tuple[str, ...]] = []
     with closing(world):
         result = run_episode(world, agent, scenario, lambda step: steps.append(step_digests(step)))

@@ -8,19 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from caldrive.datatypes import Scenario, Step
-from caldrive.driving.drivers import chosen_scenarios, set_up
-from caldrive.driving.film import EpisodeFilm, caption
-from caldrive.driving.outputs import require_writable_folder
-from caldrive.driving.plots import draw_speed
+from caldrive.agents.registry import agent_entry
+from caldrive.checks import require_writable_folder
+from caldrive.datatypes import Step
+from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriveSettings
-from caldrive.driving.trace import Trace, episode_json, result_values
-from caldrive.driving.video import VideoWriter
+from caldrive.driving.setup import set_up
+from caldrive.driving.trace import Trace, episode_json
 from caldrive.files import write_whole
 from caldrive.progress import Progress, silent
-from caldrive.results import EpisodeResult, Outcome
+from caldrive.results import EpisodeResult, Outcome, result_values
+from caldrive.scenarios import Scenario
+from caldrive.visualization.episode_video import EpisodeFilm, Shown, VideoWriter, caption
+from caldrive.visualization.plots import draw_speed
 
 
 @dataclass(frozen=True)
@@ -50,14 +52,15 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
     """
     require_writable_folder(settings.out)
     scenarios = chosen_scenarios(settings, settings.episodes)
-    world, agent = set_up(settings)
+    world, agent = set_up(settings, settings.world)
     results, files = [], []
     with closing(world), VideoWriter(settings.out / "drive.mp4", rate=1 / world.dt) as video:
         for k, scenario in enumerate(scenarios):
             trace = Trace()
             text = caption(scenario, k + 1, len(scenarios))
             referee = Referee(scenario)
-            film = EpisodeFilm(video, world, referee, text, truth=settings.agent != "oracle")
+            shown_truth = not agent_entry(settings.agent).privileged
+            film = EpisodeFilm(video, world, Shown(text, scenario, referee.infractions, shown_truth))
             watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]
             result = run_episode(world, agent, scenario, _each(watchers + [film.add] * settings.video), referee)
             film.end(result)

@@ -10,10 +10,11 @@ import math
 from collections import deque
 from collections.abc import Collection
 
-from caldrive.datatypes import ContactKind, LightState, Scenario, TrafficLight, Truth, VehicleState
+from caldrive.datatypes import ContactKind, LightState, TrafficLight, Truth, VehicleState
 from caldrive.driving.comfort import comfort
 from caldrive.geometry import wrap_angle
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
+from caldrive.scenarios import Scenario
 
 GOAL_RADIUS = 2.0  # m
 RISE_FRAMES = 10

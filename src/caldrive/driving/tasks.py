@@ -13,17 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from caldrive.config import KMH
-from caldrive.datatypes import Command, Pose, Scenario
+from caldrive.datatypes import KMH, Command, Pose
 from caldrive.geometry import wrap_angle
-from caldrive.world.roads import RoadNetwork
-from caldrive.world.route import Route, plan_route
-from caldrive.world.towns import TOWNS, load_town
+from caldrive.scenarios import Scenario
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.route import Route, plan_route
+from caldrive.world.roads.towns import TOWNS, load_roads
 
 TASKS = ("straight", "one-turn", "navigation", "navigation-dynamic")
+
 ROUTES_PER_TASK = 25
 USUAL_TRAFFIC = {"town01": (20, 50), "town02": (15, 50)}  # cars and people of the dynamic task
-_DATA = Path(__file__).parent / "data" / "routes.json"
+_DATA = Path(__file__).with_name("routes.json")
 _FROM_STOP_LINE, _FROM_LANE_START = 25.0, 6.0  # m kept between a start and the ends of its lane
 # Shortest and longest route of a task in metres, for a town of 400 m; others scale with their size.
 _LENGTHS = {"straight": (90.0, 300.0), "one-turn": (130.0, 420.0), "navigation": (400.0, 1000.0)}
@@ -76,12 +77,12 @@ def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
     kind = "navigation" if task == "navigation-dynamic" else task
     if town in TOWNS:
         return [(Pose(*start), Pose(*goal)) for start, goal in _fixed_routes()[town][kind]]
-    return draw_routes(load_town(town), kind, ROUTES_PER_TASK, np.random.default_rng(seed))
+    return draw_routes(load_roads(town), kind, ROUTES_PER_TASK, np.random.default_rng(seed))
 
 
 @lru_cache(maxsize=4096)  # the same in all weathers
 def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
-    route = plan_route(load_town(town), start, goal)
+    route = plan_route(load_roads(town), start, goal)
     return route.time_limit if kind == "paper" else route.length / (5 * KMH) + 10
 
 
@@ -119,7 +120,7 @@ def _draw_all() -> None:
         town: {
             task: [
                 [[round(v, 3) for v in (p.x, p.y, p.heading)] for p in pair]
-                for pair in draw_routes(load_town(town), task, ROUTES_PER_TASK, rng)
+                for pair in draw_routes(load_roads(town), task, ROUTES_PER_TASK, rng)
             ]
             for task in _LENGTHS
         }

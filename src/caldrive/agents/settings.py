@@ -1,0 +1,21 @@
+"""Who drives, as the command line, TOML files and Python say it. Apart from the registry, so that --help is quick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentSettings:
+    """Who drives."""
+
+    agent: str = "cal"
+    """Who drives: cal sees the camera image only, oracle knows the truth; or your own: package.module:Class or
+    file.py:Class."""
+    model: Path | None = None
+    """The network of cal, a .safetensors file; without it the one in the package."""
+    controller: str = "default"
+    """default, paper (the laws as printed), a .toml file of constants, package.module:Class or file.py:Class."""
+    cap: float | None = None
+    """A speed in km/h that no limit exceeds; the paper's comparison drives with 20."""

@@ -1,0 +1,65 @@
+"""Drives a benchmark's episode again, films it, and compares."""
+
+from __future__ import annotations
+
+import json
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from caldrive.benchmark.run_folder import RunFolder, as_driven
+from caldrive.benchmark.suites import Trial
+from caldrive.checks import require_writable_file
+from caldrive.datatypes import Step
+from caldrive.driving.referee import Referee
+from caldrive.driving.rollout import run_episode
+from caldrive.driving.setup import set_up
+from caldrive.progress import Progress, silent
+from caldrive.results import EpisodeResult, result_values
+from caldrive.visualization.episode_video import EpisodeFilm, Shown, VideoWriter, caption
+
+
+@dataclass(frozen=True)
+class Replay:
+    """An episode driven again: how it went, whether as before, and its video."""
+
+    result: EpisodeResult
+    same: bool
+    video: Path
+
+
+def replay(path: Path, key: str, out: Path, progress: Progress = silent) -> Replay:
+    """Drives the episode of a benchmark's folder again, exactly, and writes its video.
+
+    Raises ValueError where there is no such run or episode.
+    """
+    require_writable_file(out, "--out", ".mp4")
+    folder = RunFolder(path)
+    trial = next((trial for trial in folder.trials if trial.key == key), None)
+    if trial is None:
+        raise ValueError(
+            f"found no episode {key!r} in {folder.about['suite']}, wanted one like {folder.trials[0].key}: type its key"
+        )
+    line = folder.lines().get(key)
+    if line is not None:
+        as_driven(trial, line)  # refuses another episode of this name
+    result = _film(folder, trial, out, progress)
+    same = line is not None and line["result"] == json.loads(json.dumps(result_values(result)))
+    return Replay(result, same, out)
+
+
+def _film(folder: RunFolder, trial: Trial, out: Path, progress: Progress) -> EpisodeResult:
+    """Drives a trial as the folder's run did, and films it."""
+    world, agent = set_up(folder.driver)
+    with closing(world), VideoWriter(out, rate=1 / world.dt) as video:
+        referee = Referee(trial.scenario, trial.fatal)
+        text = f"{caption(trial.scenario, 1, 1)}   {trial.key}"
+        film = EpisodeFilm(video, world, Shown(text, trial.scenario, referee.infractions, truth=True))
+
+        def watch(step: Step) -> None:
+            film.add(step)
+            progress(trial.key, min(1.0, step.truth.route_done / step.truth.route_length))
+
+        result = run_episode(world, agent, trial.scenario, watch, referee)
+        film.end(result)
+    return result

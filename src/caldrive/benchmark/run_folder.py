@@ -1,0 +1,237 @@
+"""A benchmark's folder: what drove it (run.json), and a line for each episode that is done (results.jsonl).
+
+Lines are appended and never changed, so a run that was killed holds all that it had finished. A folder takes results of
+one agent, model, code and precision only. Results that are kept for others may be compressed (results.jsonl.gz).
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+import os
+import zlib
+from collections import Counter
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NotRequired, TypedDict
+
+from caldrive.agents.registry import provenance
+from caldrive.agents.settings import AgentSettings
+from caldrive.benchmark.settings import BenchmarkSettings
+from caldrive.benchmark.suites import SUITES, Driven, Trial, from_json, suite
+from caldrive.files import json_line, read_json, write_whole
+from caldrive.provenance import code_version, machine_name
+from caldrive.results import result_from_values
+from caldrive.world.roads.towns import TOWNS
+
+RESULTS, RUN = "results.jsonl", "run.json"
+PACKED = RESULTS + ".gz"
+
+
+class About(TypedDict):
+    """What run.json says.
+
+    suite_content, agent_source, controller_source: digests of files of one's own. model_file: the path of the network,
+    where it is not the package's."""
+
+    suite: str
+    suite_content: str | None
+    agent: str
+    agent_source: NotRequired[str | None]
+    controller: str
+    controller_source: NotRequired[str | None]
+    cap: float | None
+    time_limit: str
+    seed: int
+    code: str
+    model: str | None
+    precision: str | None
+    model_file: str | None
+    began: str
+    machine: str
+    workers: int
+
+
+class Line(TypedDict):
+    """What a line of results.jsonl says of an episode."""
+
+    key: str
+    result: dict[str, Any]
+    figures: dict[str, int | float | None]
+
+
+@dataclass(frozen=True)
+class EpisodeRecord:
+    """What is kept of a trial: its line, its files by their names, and what drove it (`driven_with`)."""
+
+    line: dict[str, Any]
+    files: dict[str, bytes]
+    driven_with: dict[str, Any]
+
+
+def driven_with(driver: AgentSettings) -> dict[str, Any]:
+    """What results depend on in the process that drives: code, network, precision, and files of one's own."""
+    return {"code": code_version(), **provenance(driver)}
+
+
+def suite_content(path: Path) -> str:
+    """Tells a suite of one's own from any other: a digest of its file and of the maps that it drives in."""
+    maps = sorted({trial.scenario.town for trial in from_json(path)} - set(TOWNS))
+    content = b"".join(part.read_bytes() for part in (path, *map(Path, maps)))
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def identity(settings: BenchmarkSettings, ours: dict[str, Any]) -> dict[str, Any]:
+    """What a folder's results depend on. ours: this process' `driven_with`."""
+    own, driver = Path(settings.suite) if settings.suite not in SUITES else None, settings.driver
+    return {
+        "suite": str(own.resolve()) if own else settings.suite, "suite_content": suite_content(own) if own else None,
+        "agent": driver.agent, "controller": driver.controller, "cap": driver.cap,
+        "time_limit": settings.time_limit, "seed": settings.seed, **ours,
+    }  # fmt: skip
+
+
+class RunFolder:
+    """A folder that has a run.json. about: what it says."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises ValueError where there is no run, or its description is damaged."""
+        self.path = path
+        self.about: dict[str, Any] = _read_about(path)
+
+    @classmethod
+    def claim(cls, settings: BenchmarkSettings, ours: dict[str, Any]) -> RunFolder:
+        """The folder for settings' results, begun or taken up. Raises ValueError where it holds another run's."""
+        path, wanted = settings.out, identity(settings, ours)
+        if not (path / RUN).is_file():
+            if (path / RESULTS).is_file():
+                raise ValueError(f"found results in {path}, but no {RUN} that says whose: give another --out")
+            more = {
+                "model_file": str(settings.model.resolve()) if settings.model else None,
+                "began": datetime.now(UTC).isoformat(timespec="seconds"),
+                "machine": machine_name(), "workers": settings.workers,
+            }  # fmt: skip
+            write_whole(path / RUN, (json.dumps(wanted | more, indent=2) + "\n").encode())
+        folder = cls(path)
+        for name, value in wanted.items():
+            if folder.about.get(name) != value:
+                raise ValueError(
+                    f"found in {path} results with {name} {folder.about.get(name)}, wanted {value}: give another --out"
+                )
+        return folder
+
+    @property
+    def driver(self) -> AgentSettings:
+        """Who drove."""
+        about = self.about
+        model = Path(about["model_file"]) if about["model_file"] else None
+        return AgentSettings(agent=about["agent"], model=model, controller=about["controller"], cap=about["cap"])
+
+    @cached_property
+    def trials(self) -> list[Trial]:
+        """The suite's trials. Raises ValueError where the file of a suite of one's own is not what it was."""
+        about = self.about
+        if about["suite_content"] is not None:
+            _require_same(Path(about["suite"]), about["suite_content"])
+        return suite(about["suite"], about["seed"], about["time_limit"])
+
+    def lines(self) -> dict[str, dict[str, Any]]:
+        """The lines by trial, as `read_lines`."""
+        return read_lines(self.path)
+
+    def missing(self) -> list[Trial]:
+        """The trials that are not driven yet."""
+        known = self.lines()
+        return [trial for trial in self.trials if trial.key not in known]
+
+    def driven(self) -> list[Driven]:
+        """The results, in the suite's order. Raises ValueError where a line is of an older suite's trial."""
+        lines = self.lines()
+        return [as_driven(trial, lines[trial.key]) for trial in self.trials if trial.key in lines]
+
+    def keep(self, record: EpisodeRecord) -> None:
+        """Writes an episode's files, and last its line. Raises ValueError where a worker drove with something else."""
+        for name, value in record.driven_with.items():
+            if self.about.get(name) != value:
+                raise ValueError(
+                    f"found a worker with {name} {value}, wanted {self.about.get(name)}: "
+                    "install the same caldrive and model on machines of one kind"
+                )
+        for name, content in record.files.items():
+            write_whole(self.path / name, content)
+        _append(self.path / RESULTS, record.line)
+
+
+def as_driven(trial: Trial, line: dict[str, Any]) -> Driven:
+    """A trial and its line. Raises ValueError where the line is of an older suite's trial of this name."""
+    result = result_from_values(line["result"])
+    if result.scenario != trial.scenario:
+        raise ValueError(
+            f"found that {trial.key} was another episode when it was driven: type caldrive benchmark --out ANOTHER"
+        )
+    return Driven(trial, result, line["figures"])
+
+
+def _read_about(folder: Path) -> dict[str, Any]:
+    path = folder / RUN
+    if not path.is_file():
+        raise ValueError(f"found no {RUN} in {folder}, wanted a benchmark's folder: type caldrive benchmark --out DIR")
+    try:
+        return dict(read_json(path.read_bytes(), About))
+    except ValueError as error:
+        raise ValueError(
+            f"found that {path} is damaged ({error}), wanted a run's description: type caldrive benchmark --out ANOTHER"
+        ) from error
+
+
+def _require_same(path: Path, content: str) -> None:
+    try:
+        now = suite_content(path)
+    except (ValueError, OSError) as error:
+        now = str(error)
+    if now != content:
+        raise ValueError(
+            f"found that {path} or a map in it is not what was driven ({now}), wanted "
+            f"{content}: put it back, or type caldrive benchmark --out ANOTHER"
+        )
+
+
+def read_lines(folder: Path) -> dict[str, dict[str, Any]]:
+    """The lines of a folder's results by trial, compressed or not. One that was being written when the run was killed
+    is no line. Raises ValueError for a damaged one."""
+    path = folder / RESULTS
+    try:
+        if not path.is_file() and (folder / PACKED).is_file():
+            path = folder / PACKED
+            text = gzip.decompress(path.read_bytes())
+        else:
+            text = path.read_bytes() if path.is_file() else b""
+        lines = [_line(one) for one in text.split(b"\n")[:-1]]
+        if twice := [key for key, n in Counter(line["key"] for line in lines).items() if n > 1]:
+            raise ValueError(f"{twice[0]} is there twice")
+        return {line["key"]: line for line in lines}
+    except (ValueError, EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise ValueError(f"found a damaged line in {path} ({error}), wanted results: give another --out") from error
+
+
+def _line(text: bytes) -> dict[str, Any]:
+    """One line, which holds what results hold."""
+    line = read_json(text, Line)
+    result_from_values(line["result"])
+    for name, value in line["figures"].items():
+        if value is None and "/" not in name:  # of affordances nothing is known where nothing was seen
+            raise ValueError(f"{name} is no number")
+    return dict(line)
+
+
+def _append(path: Path, values: dict[str, Any]) -> None:
+    """One more line, on the disk when this returns. Cuts off the rest of a line that was broken off."""
+    with path.open("ab+") as file:
+        file.seek(0)
+        file.truncate(file.read().rfind(b"\n") + 1)
+        file.write(json_line(values))
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,143 @@
+"""The runner: drives a suite with several workers, and can be killed at any moment.
+
+What a trial gives depends on the trial and on what drives only, so the lines of a run that was broken off ten times are
+those of an unbroken one, in another order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any
+
+from caldrive.agents.settings import AgentSettings
+from caldrive.benchmark.behaviour import Behaviour
+from caldrive.benchmark.evidence import Evidence
+from caldrive.benchmark.reuse import driven_elsewhere
+from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, driven_with
+from caldrive.benchmark.settings import BenchmarkSettings
+from caldrive.benchmark.suites import SUITES, Trial, suite
+from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_writable_folder
+from caldrive.datatypes import Step
+from caldrive.driving.referee import Referee
+from caldrive.driving.rollout import run_episode
+from caldrive.driving.setup import set_up
+from caldrive.files import held
+from caldrive.parallel.processes import spread
+from caldrive.parallel.ray_cluster import require_ray, spread_over_cluster
+from caldrive.results import plain, result_values
+from caldrive.scenarios import Scenario
+from caldrive.world.roads.route import plan_route
+from caldrive.world.roads.towns import load_roads
+from caldrive.world.scene.weather import weather
+from caldrive.world.traffic.pedestrians import require_room
+from caldrive.world.traffic.vehicles import free_places
+
+
+@lru_cache(maxsize=1)
+def _set_up(driver: AgentSettings) -> Any:
+    """One world, agent and provenance for each process."""
+    return *set_up(driver), driven_with(driver)
+
+
+def _let_go(driver: AgentSettings) -> None:
+    """Closes the world of this process, if a trial was driven in it."""
+    if _set_up.cache_info().currsize:
+        _set_up(driver)[0].close()
+        _set_up.cache_clear()
+
+
+def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
+    """What a worker does: drives one trial, and returns all that is kept of it."""
+    world, agent, ours = _set_up(driver)
+    referee = Referee(trial.scenario, trial.fatal)
+    behaviour, evidence = Behaviour(), Evidence(world, referee)
+
+    def watch(step: Step) -> None:
+        behaviour.add(step)
+        evidence.add(step)
+
+    result = run_episode(world, agent, trial.scenario, watch, referee)
+    figures = {name: plain(value) for name, value in behaviour.figures(result.infractions).items()}
+    line = {"key": trial.key, "result": result_values(result), "figures": figures}
+    return EpisodeRecord(line, evidence.files(trial.key, result), ours)
+
+
+@dataclass(frozen=True)
+class Advance:
+    """How far a run is: trials done, of how many, and whether the last one succeeded."""
+
+    done: int
+    of: int
+    success: bool
+
+
+def benchmark(settings: BenchmarkSettings) -> Iterator[Advance]:
+    """Drives the trials that a folder lacks; yields how far the run is.
+
+    Raises ValueError where a folder belongs to another run, RuntimeError where workers keep dying or Ray is missing.
+    """
+    known = [RunFolder(folder) for folder in settings.known]
+    _check(settings)
+    ours = driven_with(settings.driver)  # looks at agent and network before there is a folder
+    with held(settings.out):
+        folder = RunFolder.claim(settings, ours)
+        for record in driven_elsewhere(known, folder.missing(), folder.about | ours):
+            folder.keep(record)
+        missing = folder.missing()
+        done = len(folder.trials) - len(missing)
+        try:
+            for record in _drive(settings, partial(drive_trial, settings.driver), missing):
+                folder.keep(record)
+                done += 1
+                yield Advance(done, len(folder.trials), record.line["result"]["outcome"] == "success")
+        finally:
+            _let_go(settings.driver)
+
+
+def _check(settings: BenchmarkSettings) -> None:
+    """Refuses what no benchmark can be made of before a folder is claimed."""
+    require_within("--workers", settings.workers, 1, MOST_WORKERS, 2)
+    require_within("--seed", settings.seed, 0, MOST_SEED, 0)
+    if settings.ray is not None:
+        require_ray()
+    if settings.cap is not None:
+        require_within("--cap", settings.cap, 1.0, 200.0, 20)
+    if settings.suite not in SUITES:
+        if (settings.seed, settings.time_limit) != (0, "paper"):
+            raise ValueError(
+                f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
+            )
+        _check_places(settings.suite, suite(settings.suite))
+    require_writable_folder(settings.out)
+
+
+def _check_places(name: str, trials: list[Trial]) -> None:
+    """Refuses towns, weathers and ways that there are not, and more cars or people than there is room for."""
+    for trial in trials:
+        try:
+            _check_place(trial.scenario)
+        except (ValueError, OSError) as error:
+            raise ValueError(
+                f"found that {trial.key} in {name} cannot be driven ({error}): change its scenario"
+            ) from error
+
+
+def _check_place(scenario: Scenario) -> None:
+    weather(scenario.weather)
+    roads = load_roads(scenario.town)
+    route = plan_route(roads, scenario.start, scenario.goal)
+    free_places(roads, scenario.n_vehicles, route.line.pose_at(0.0))
+    require_room(roads, scenario.n_pedestrians)
+
+
+def _drive(
+    settings: BenchmarkSettings, work: Callable[[Trial], EpisodeRecord], trials: list[Trial]
+) -> Iterator[EpisodeRecord]:
+    """The trials' records as they are done, by processes of this machine or by Ray's."""
+    if settings.ray is None:
+        done = spread(work, trials, settings.workers)
+    else:
+        done = spread_over_cluster(work, trials, settings.workers, settings.ray)
+    return (record for _, record in done)

@@ -1,0 +1,40 @@
+"""What an option's number may be, looked at before the work begins."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+MOST_SEED = 2**31 - 1  # a million times as much is still a seed for torch
+MOST_WORKERS = 1024
+MOST_PIXELS = 4096  # a side of an image
+
+
+def require_within(option: str, value: float, low: float, high: float, usual: float) -> None:
+    """Raises ValueError where the value of an option is not a number from low to high; usual: what to type instead."""
+    if not low <= value <= high:
+        wanted = f"{low} or more" if high == math.inf else f"{low} to {high}"
+        raise ValueError(f"found {option} {value}, wanted {wanted}: type {option} {usual}")
+
+
+def require_writable_folder(folder: Path, option: str = "--out") -> None:
+    """Raises OSError where the folder neither is there to be written to nor can be made. option: what named it."""
+    nearest = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists())
+    if not nearest.is_dir():
+        raise OSError(f"found that {nearest} is a file, wanted a folder to write to: give another {option}")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise OSError(
+            f"found that {nearest} cannot be written to, wanted a folder for the results: give another {option}"
+        )
+
+
+def require_writable_file(path: Path, option: str, ending: str) -> None:
+    """Raises ValueError where the name has another ending, by which a picture could take a recording's place, OSError
+    where a file cannot be written under it. option: what named it."""
+    if path.suffix.lower() != ending:
+        said = f"{option} {path.with_suffix(ending) if path.name else path / f'NAME{ending}'}"
+        raise ValueError(f"found {option} {path}, wanted a name that ends in {ending}: type {said}")
+    if path.is_dir():
+        raise OSError(f"found that {path} is a folder, wanted the name of a file: type {option} {path / 'NAME'}")
+    require_writable_folder(path.parent, option)

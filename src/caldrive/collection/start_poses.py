@@ -1,0 +1,118 @@
+"""Where recorded episodes begin: anywhere, or before what is rare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from caldrive.agents.cal import CALAgent, OraclePerception
+from caldrive.collection.config import CollectConfig
+from caldrive.collection.perturbation import HiddenCars, Tailgater
+from caldrive.control.controller import CALController, ControlConfig
+from caldrive.control.patience import PatienceConfig
+from caldrive.datatypes import Command, Observation, Pose, Sign
+from caldrive.interfaces import RecordableWorld
+from caldrive.scenarios import Scenario
+from caldrive.world.roads.network import Lane, RoadNetwork
+from caldrive.world.roads.route import Route, random_route
+from caldrive.world.scene.domain_randomisation import one_of
+from caldrive.world.town import load_town
+from caldrive.world.traffic.vehicles import room
+
+AHEAD_OF_SIGN, AHEAD_OF_TURN = (15.0, 45.0), (2.0, 25.0)  # m
+ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
+GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
+CAPS = (20.0, 20.0, None)  # km/h, one of them at random, None for the signs alone; tailgaters have the first
+FAST, SLOW = 14, 6  # m/s; no episode is faster in the mean, and no tailgater's
+SEARCH = 6  # times the wanted duration that a tailgater may drive, who has to find a car
+
+
+def starting_place(
+    roads: RoadNetwork, signs: Sequence[Sign], before_signs: float, before_turns: float, rng: np.random.Generator
+) -> tuple[Pose, str | None]:
+    """Anywhere on the roads, or in a share of the cases some way before a sign or a turn at a junction; each limit and
+    each command gets as many of these. Returns the place, and the lane of that turn if any."""
+    chance = rng.random()
+    limits = sorted({sign.limit for sign in signs})
+    if limits and chance < before_signs:
+        limit = one_of(limits, rng)
+        sign = one_of([sign for sign in signs if sign.limit == limit], rng)
+        lane, at = roads.lane_at(sign.pose)
+        return _upstream(roads, lane, at - float(rng.uniform(*AHEAD_OF_SIGN))), None
+    turns = [lane for lane in roads.lanes.values() if lane.turn is not None]
+    commands = [command for command in Command if any(lane.turn is command for lane in turns)]
+    if commands and before_signs <= chance < before_signs + before_turns:
+        command = one_of(commands, rng)
+        turn = one_of([lane for lane in turns if lane.turn is command], rng)
+        return _upstream(roads, turn, -float(rng.uniform(*AHEAD_OF_TURN))), turn.id
+    lane = one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
+    return lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3))), None
+
+
+def _upstream(roads: RoadNetwork, lane: Lane, s: float) -> Pose:
+    """The place s m along a lane; where that is negative, as far up the street before it, but inside no junction."""
+    before = [one for one in roads.lanes.values() if lane.id in one.successors]
+    if s >= 1 or len(before) != 1 or before[0].turn is not None:
+        return lane.line.pose_at(max(s, 1.0))
+    return _upstream(roads, before[0], s + before[0].line.length)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What an episode is before it begins: where it drives, among whom, in which look of the town, and how."""
+
+    scenario: Scenario
+    route: Route
+    appearance: int
+    tailgating: bool
+
+
+def plan_episode(config: CollectConfig, number: int, rng: np.random.Generator) -> Plan:
+    """A random start and random turns."""
+    tailgating = rng.random() < config.tailgating
+    appearance = int(rng.integers(1, 2**31))
+    town = load_town(config.town, appearance if rng.random() < config.randomised else 0)
+    rare = (0.0, 0.0) if tailgating else (config.before_signs, config.before_turns)
+    start, turn = starting_place(town.roads, town.signs, *rare, rng)
+    length = config.duration * (SEARCH * SLOW if tailgating else FAST) + 50
+    route = random_route(town.roads, start, length, rng, turn)
+    scenario = Scenario(
+        town=config.town, weather=config.weathers[number % len(config.weathers)], start=start,
+        goal=route.line.pose_at(route.length), n_vehicles=_cars(config, tailgating, room(town.roads), rng),
+        n_pedestrians=config.people, time_limit=config.duration, seed=int(rng.integers(2**31)), task="collect",
+        crossing=config.crossing,
+    )  # fmt: skip
+    return Plan(scenario, route, town.appearance, tailgating)
+
+
+def begin_episode(
+    world: RecordableWorld, config: CollectConfig, plan: Plan, rng: np.random.Generator
+) -> tuple[Observation, CALAgent]:
+    """The first observation, and the driver, ready."""
+    cap = CAPS[0] if plan.tailgating else CAPS[int(rng.integers(len(CAPS)))]
+    perception = _oracle(world, config, plan.tailgating, rng)
+    # Whom no car is told of must not take one for nothing, however long it stands there.
+    agent = CALAgent(perception, CALController(ControlConfig(patience=PatienceConfig(enabled=False), cap=cap)))
+    observation = world.reset(plan.scenario, route=plan.route, appearance=plan.appearance)
+    if rng.random() < config.displaced:
+        observation = world.displace(float(rng.uniform(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
+    agent.reset()
+    return observation, agent
+
+
+def _cars(config: CollectConfig, tailgating: bool, most: int, rng: np.random.Generator) -> int:
+    """How many others drive; most: for how many there is room."""
+    if tailgating:
+        return min(2 * config.cars, most)
+    return config.cars if rng.random() < 0.5 else config.cars // 3
+
+
+def _oracle(
+    world: RecordableWorld, config: CollectConfig, tailgating: bool, rng: np.random.Generator
+) -> OraclePerception:
+    """Who tells the controller of the town: the truth, or what makes the driver come close to cars."""
+    if tailgating:
+        return Tailgater(world.truth, float(rng.uniform(*GAPS)))
+    return (HiddenCars if rng.random() < config.hidden_cars else OraclePerception)(world.truth)

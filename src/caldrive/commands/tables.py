@@ -1,0 +1,186 @@
+"""Results as tables for people."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Group
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from caldrive.affordances import BY_NAME, SPECS, AffordanceSpec
+from caldrive.results import EpisodeResult, Outcome, mean_speed
+
+if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
+    from caldrive.benchmark.metrics import Cell
+    from caldrive.benchmark.suites import Driven
+    from caldrive.driving.drive import DriveReport
+    from caldrive.driving.speed import WorldTiming
+    from caldrive.perception.evaluation.report import Report
+    from caldrive.recordings.check import Recording
+
+
+def infraction_counts(result: EpisodeResult) -> dict[str, int]:
+    """How many of each kind, in the order in which they first happened."""
+    return dict(Counter(one.kind.value for one in result.infractions))
+
+
+def _row(k: int, result: EpisodeResult) -> list[str | Text]:
+    broken = ", ".join(f"{n} × {kind}" for kind, n in infraction_counts(result).items())
+    reached = result.outcome is Outcome.SUCCESS
+    return [
+        str(k),
+        result.scenario.task,
+        Text(result.outcome.name.lower(), "green" if reached else "yellow"),
+        f"{result.duration:.0f} / {result.scenario.time_limit:.0f} s",
+        f"{result.distance:.0f} / {result.route_length:.0f} m",
+        f"{mean_speed(result):.1f}",
+        Text(broken or "none", "red" if broken else "green"),
+    ]
+
+
+def drive_table(report: DriveReport) -> Group:
+    """One row for each episode, and where everything is."""
+    table = Table("episode", "task", "outcome", "time", "driven", "km/h", "infractions", box=SIMPLE_HEAD)
+    for column in table.columns[:-1]:
+        column.no_wrap = True
+    for k, result in enumerate(report.results):
+        table.add_row(*_row(k, result))
+    reached = sum(result.outcome is Outcome.SUCCESS for result in report.results)
+    broken = sum(len(result.infractions) for result in report.results)
+    summary = f"{reached} of {len(report.results)} reached the goal in time; infractions: {broken or 'none'}"
+    video = [Text(f"video: {report.video}")] if report.video else []
+    return Group(table, Text(summary), *video, Text(f"episodes: {report.files[0].parent}"))
+
+
+def world_table(speed: WorldTiming) -> Group:
+    """Where a step's time goes, the longest first."""
+    table = Table("part of a step", "median ms", "share", box=SIMPLE_HEAD)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for name, value in sorted(speed.parts_ms.items(), key=lambda item: -item[1]):
+        table.add_row(name, f"{value:.3f}", f"{100 * value / speed.median_ms:.0f} %")
+    table.add_row("whole step", f"{speed.median_ms:.3f}", "", style="bold")
+    first = f"first frame after {speed.first_frame:.2f} s, and {speed.imports:.2f} s to load the libraries before it"
+    return Group(table, Text(f"{speed.steps_per_second:.0f} camera steps a second"), Text(first))
+
+
+def counts_table(folder: Path, counts: dict[str, dict[str, int]]) -> Group:
+    """How many frames of a recording carry which label."""
+    table = Table("label", "frames", box=SIMPLE_HEAD)
+    for name, values in counts.items():
+        shown = ", ".join(f"{value}: {n}" for value, n in values.items())
+        table.add_row(name.replace("_", " "), shown or "none")
+    return Group(table, Text(f"recorded: {folder}; train on it: caldrive train --data {folder}"))
+
+
+def recording_table(found: Recording, picture: Path | None) -> Group:
+    """What a recording holds, and its damaged files and missing episodes."""
+    weathers = ", ".join(f"{n} in weather {weather}" for weather, n in sorted(found.weathers.items(), key=_number))
+    shown: list[Table | Text] = [Text(f"{found.episodes} episodes: {weathers or 'none is sound'}")]
+    if picture is not None:
+        table = Table("label", "value", "frames", "share", box=SIMPLE_HEAD)
+        for name, values in found.counts.items():
+            for value, n in values.items():
+                table.add_row(name.replace("_", " "), value, str(n), f"{100 * n / found.frames:.1f} %")
+        shown += [Text(f"{found.frames} frames, {found.minutes:.0f} minutes"), table, Text(f"histograms: {picture}")]
+    damaged = [Text(sentence, "red") for sentence in found.damaged] or [Text("no damaged file", "green")]
+    left = [Text(f"{found.missing} more were asked for: type `caldrive collect` as before", "yellow")]
+    return Group(*shown, *damaged, *(left if found.missing else []))
+
+
+def _number(item: tuple[str, int]) -> int:
+    return int(item[0])
+
+
+def _published(cell: Cell) -> str:
+    from caldrive.benchmark.published import success
+
+    found = success("CAL", cell.condition, cell.task)
+    return "" if found is None else f"  paper {found}"
+
+
+def _text(cell: Cell) -> Text:
+    low, high = cell.interval
+    text = f"{cell.successes}/{cell.episodes}  {cell.percent:.0f} % ({low:.0f}-{high:.0f}){_published(cell)}"
+    return Text(text, no_wrap=True)
+
+
+def success_table(driven: Sequence[Driven]) -> Table:
+    """Success in each cell, percent with the 95 % interval, beside what the paper's CAL reached."""
+    from caldrive.benchmark.metrics import cells
+
+    found = {(cell.condition, cell.task): cell for cell in cells(driven)}
+    conditions, tasks = (list(dict.fromkeys(key[k] for key in found)) for k in (0, 1))
+    table = Table("success", *map(escape, conditions), box=SIMPLE_HEAD)
+    for task in tasks:
+        row = [found.get((condition, task)) for condition in conditions]
+        table.add_row(Text(task), *(_text(cell) if cell else "" for cell in row))
+    return table
+
+
+def infraction_table(driven: Sequence[Driven]) -> Table:
+    """Kilometres between infractions of each kind, by condition."""
+    from caldrive.benchmark.metrics import rates
+
+    conditions = list(dict.fromkeys(one.trial.condition for one in driven))
+    table = Table("km between", *map(escape, conditions), box=SIMPLE_HEAD)
+    columns = [rates([one for one in driven if one.trial.condition == name]) for name in conditions]
+    for row in zip(*columns, strict=True):
+        table.add_row(row[0].kind.value, *(f"{rate.km_between} ({rate.count})" for rate in row))
+    return table
+
+
+def benchmark_table(driven: Sequence[Driven], out: str) -> Group:
+    """Both, and where the results are."""
+    return Group(success_table(driven), infraction_table(driven), Text(f"results: {out}"))
+
+
+def _metric(spec: AffordanceSpec) -> str:
+    """The name of the affordance's figure: mean IoU of a discrete one, mean absolute error of the others."""
+    return f"{spec.name}/iou" if spec.discrete else f"{spec.name}/mae"
+
+
+def _head(spec: AffordanceSpec) -> str:
+    words = spec.title.replace(" ", "\n")
+    return f"{words}\nIoU %" if spec.discrete else f"{words}\n{spec.unit}"
+
+
+def _figures(figures: Mapping[str, float]) -> list[str]:
+    """One cell for each affordance, in percent or in SI units."""
+    return [f"{(100 if spec.discrete else 1) * figures[_metric(spec)]:.3g}" for spec in SPECS]
+
+
+def _scaled(figures: Mapping[str, float]) -> list[str]:
+    """Errors of the continuous affordances in units of their scale, as the supplement prints them."""
+    return ["" if spec.discrete else f"{figures[_metric(spec)] / spec.scale:.3g}" for spec in SPECS]
+
+
+def evaluation_table(report: Report, precision: str) -> Group:
+    """Mean IoU and MAE over all frames beside the paper's, then by command, weather and so on; confusions."""
+    from caldrive.perception.evaluation.report import published_figures
+
+    table = Table("", *map(_head, SPECS), box=SIMPLE_HEAD)
+    for column in table.columns:
+        column.no_wrap = True
+    rows = {"all frames": report.overall, "the paper, in CARLA": published_figures()}
+    rows |= {f"{kind} {value}": row for kind, values in report.groups.items() for value, row in values.items()}
+    for name, figures in rows.items():
+        table.add_row(name, *_figures(figures))
+    table.add_row("all, scaled", *_scaled(report.overall))
+    table.add_row("the paper, scaled", *_scaled(published_figures()))
+    head = Text(f"{report.frames} frames, in {precision}")
+    return Group(head, table, *(_confusion(name, counts) for name, counts in report.confusion.items()))
+
+
+def _confusion(name: str, counts: list[list[int]]) -> Table:
+    classes = BY_NAME[name].classes
+    table = Table(f"{BY_NAME[name].title}, true", *(f"seen as {c}" for c in classes), box=SIMPLE_HEAD)
+    for c, row in zip(classes, counts, strict=True):
+        table.add_row(str(c), *map(str, row))
+    return table

@@ -1,0 +1,67 @@
+"""Work for processes on one machine or many, through Ray (the extra `ray`). A worker that dies is replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from caldrive.parallel.processes import MOST_DEATHS
+
+T = TypeVar("T")
+
+R = TypeVar("R")
+
+LOCAL = "local"
+
+
+def require_ray() -> Any:
+    """Ray itself. Raises RuntimeError where it is not installed."""
+    try:
+        import ray
+    except ImportError as error:
+        raise RuntimeError("found no Ray, wanted it for --ray: type pip install 'caldrive[ray]'") from error
+    return ray
+
+
+def _done(work: Callable[[T], R], item: T) -> R:
+    return work(item)
+
+
+def _connect(ray: Any, address: str, workers: int) -> None:
+    """Starts Ray on this machine, or joins a cluster. Raises ValueError where there is none at the address."""
+    quiet = {"log_to_driver": False, "logging_level": "ERROR"}
+    if address == LOCAL:
+        ray.init(address=LOCAL, num_cpus=workers, include_dashboard=False, **quiet)
+        return
+    try:
+        ray.init(address=address, **quiet)
+    except (ConnectionError, RuntimeError) as error:
+        raise ValueError(
+            f"found no Ray cluster at {address} ({error}), wanted one: type ray start --head there, or --ray {LOCAL}"
+        ) from error
+
+
+def spread_over_cluster(
+    work: Callable[[T], R], items: Sequence[T], workers: int, address: str
+) -> Iterator[tuple[T, R]]:
+    """Does what `pool.spread` does with Ray's workers. address: of a cluster, `auto` for the one this machine belongs
+    to, `local` for one on this machine alone with so many workers.
+
+    Raises RuntimeError where Ray is missing or workers die again and again, ValueError where there is no cluster.
+    """
+    ray = require_ray()
+    _connect(ray, address, workers)
+    try:
+        remote = ray.remote(max_retries=MOST_DEATHS, num_cpus=1)(_done)
+        jobs = {remote.remote(work, item): item for item in items}
+        while jobs:
+            done, _ = ray.wait(list(jobs), num_returns=1)
+            yield jobs.pop(done[0]), ray.get(done[0])
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause from None  # the work's own error, as without Ray
+    except ray.exceptions.RayError as error:
+        raise RuntimeError(
+            f"found that Ray's workers fail ({type(error).__name__}): type --workers 1 without --ray to see why"
+        ) from error
+    finally:
+        ray.shutdown()

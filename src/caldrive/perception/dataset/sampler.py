@@ -1,0 +1,86 @@
+"""Which windows of a recording train, and how often each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.affordances import SPECS
+from caldrive.datatypes import MAX_VEHICLE_DISTANCE
+from caldrive.perception.dataset.frames import Frames, Ids
+from caldrive.perception.network.checkpoint import DataSummary
+from caldrive.recordings.writer import EpisodeError
+
+# Edges of the classes in which the size of a continuous column is balanced.
+SIZES = {
+    "vehicle_distance": (3.0, 6.0, 12.0, 25.0, MAX_VEHICLE_DISTANCE),
+    "center_distance": (0.4, 0.8, 1.2),
+    "clean_steer": (0.05, 0.15, 0.4),
+}
+WAITING = 0.25  # weight of a frame in which the car stands and has to: it looks like the one before
+
+
+def rarity(frames: Frames, balance: float) -> NDArray[np.float64]:
+    """For each frame (N,): (1 / frequency) ** balance of its rarest class; of classes are the discrete affordances, the
+    command inside a junction and elsewhere, and the sizes of what is continuous."""
+    numbers = [frames.targets[s.name].numpy() for s in SPECS if s.discrete]
+    numbers += [np.digitize(np.abs(frames.column(name)), edges) for name, edges in SIZES.items()]
+    # Each command asks for one thing inside a junction, for another before it.
+    numbers.append(2 * frames.command + frames.column("junction"))
+    frequencies = [(np.bincount(number) / len(frames))[number] for number in numbers]
+    waiting = (frames.column("speed") < 0.1) & (frames.column("clean_throttle") == 0)
+    rarest: NDArray[np.float64] = np.min(frequencies, axis=0)
+    return (1 / rarest) ** balance * np.where(waiting, WAITING**balance, 1.0)
+
+
+class Sampler:
+    """Draws training windows: the rarer the rarest class or command in it, the likelier a window.
+
+    Hazards, red lights and signs fill a few percent of a drive; drawn evenly, most batches would hold none. What step k
+    draws depends on (seed, k) only, so a run can be taken up anywhere.
+    """
+
+    def __init__(self, frames: Frames, window: int, balance: float, seed: int) -> None:
+        self.frames, self.window, self.seed = frames, window, seed
+        self.starts = frames.starts(window)
+        if not len(self.starts):
+            raise EpisodeError(
+                f"no stream of frames is {window} long: record longer episodes or make the window shorter"
+            )
+        rare = rarity(frames, balance)
+        weight = np.max([rare[self.starts + i] for i in range(window)], axis=0)
+        self.probability = weight / weight.sum()
+        self._cumulative = np.cumsum(self.probability)
+
+    def draw(self, step: int, n: int) -> Ids:
+        """First frames of n windows."""
+        chance = np.random.default_rng((self.seed, step)).random(n) * self._cumulative[-1]
+        chosen: Ids = self.starts[np.searchsorted(self._cumulative, chance, side="right")]
+        return chosen
+
+    def others(self, step: int, n: int, share: float) -> NDArray[np.bool_]:
+        """Which of n windows, a share of them, are seen with another command, if one could be given."""
+        return np.random.default_rng((self.seed, step, 1)).random(n) < share
+
+    def class_counts(self) -> dict[str, NDArray[np.float64]]:
+        """How many samples of each class the drawn windows hold, by affordance, in expectation and scaled to the data's
+        size."""
+        share = np.zeros(len(self.frames))
+        for i in range(self.window):
+            np.add.at(share, self.starts + i, self.probability / self.window)
+        return {
+            s.name: np.bincount(self.frames.targets[s.name].numpy(), share * len(self.frames), s.outputs).astype(float)
+            for s in SPECS
+            if s.discrete
+        }
+
+
+def summary(train: Frames, held: Frames) -> DataSummary:
+    """What a checkpoint remembers of its data."""
+    counts = {s.name: np.bincount(train.targets[s.name], minlength=s.outputs).tolist() for s in SPECS if s.discrete}
+    return {
+        "train_frames": len(train),
+        "validation_frames": len(held),
+        "train_classes": counts,
+        "validation_episodes": sorted({episode.key for episode in held.episodes}),
+    }

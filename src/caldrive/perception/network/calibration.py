@@ -1,0 +1,62 @@
+"""What is put right when a training ends: probabilities, as the rare was made frequent, and the ranges of 8 bits."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import torch
+from torch import Tensor, nn
+
+from caldrive.perception.network.backbone import Backbone
+from caldrive.perception.network.network import Network
+
+AT_ONCE = 16  # images
+Counts = Mapping[str, Sequence[int]]  # frames of each class (K,), by discrete affordance
+
+
+def calibrated(network: Network, counts: Counts) -> Network:
+    """A copy of the network whose probabilities are those of the recording.
+
+    Weighted by the inverse of how often they are drawn, all classes count the same in training, and so the network
+    expects them alike. Moving each class's last bias by the logarithm of its share of the frames takes that back;
+    about, as frames are drawn by the rarest of their labels, not by each. counts: of the recording.
+    """
+    return _moved(network, counts, 1.0)
+
+
+def uncalibrated(network: Network, counts: Counts) -> Network:
+    """A copy of a calibrated network as it was before, to be trained further. counts: those of its own recording."""
+    return _moved(network, counts, -1.0)
+
+
+def _moved(network: Network, counts: Counts, sign: float) -> Network:
+    network = copy.deepcopy(network)
+    for name, count in counts.items():
+        frames = torch.tensor(count, dtype=torch.float64)
+        expected = (frames / frames.sum()).clamp(min=1e-9).log()  # what never occurs is not expected
+        bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
+        bias.data += sign * (expected - expected[0]).to(bias.device)
+    return network
+
+
+@torch.no_grad()
+def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
+    """For each convolution the largest size of what enters it as normalised images (N, 3, H, W) pass.
+
+    Nothing is clipped, though that would make the steps of 8 bits finer: the few largest values are lamps and signs.
+    """
+    found: list[list[float]] = []
+
+    def note(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
+        found[-1].append(float(inputs[0].abs().max()))
+
+    hooks = [conv.register_forward_pre_hook(note) for conv in backbone.convolutions()]
+    try:
+        for part in torch.split(images, AT_ONCE):
+            found.append([])
+            backbone(part)
+    finally:
+        for hook in hooks:
+            hook.remove()
+    return tuple(map(max, zip(*found, strict=True)))

@@ -1,0 +1,159 @@
+"""A trained network on disk: one safetensors file, with all that belongs to it as JSON in its header. Nothing is
+unpickled."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypedDict
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from caldrive.affordances import SPECS, describe
+from caldrive.files import as_type, read_json, write_whole
+from caldrive.perception.network.config import PerceptionConfig
+from caldrive.perception.network.network import Network
+
+FORMAT_VERSION = 2
+KEY = "caldrive"
+
+
+class DataSummary(TypedDict, total=False):
+    """What a checkpoint remembers of its data. train_classes: frames of each class by discrete affordance;
+    validation_episodes: keys of those kept for validation."""
+
+    train_frames: int
+    validation_frames: int
+    train_classes: dict[str, list[int]]
+    validation_episodes: list[str]
+
+
+class CheckpointError(ValueError):
+    """A checkpoint cannot be used; the message says why."""
+
+
+@dataclass(frozen=True)
+class CheckpointInfo:
+    """What is known of a trained network: its configuration, its data, its validation metrics, how it was trained, and
+    the range of what enters each of its convolutions (empty where nobody looked).
+
+    The metrics are those in the precision of the training, not in the 8 bits in which it may drive."""
+
+    config: PerceptionConfig
+    data: DataSummary = field(default_factory=DataSummary)
+    metrics: dict[str, float] = field(default_factory=dict)
+    training: dict[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    ranges: tuple[float, ...] = ()
+
+
+def write_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any]) -> None:
+    """Write tensors and a JSON header, whole or not at all."""
+    contiguous = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    text = json.dumps({"version": FORMAT_VERSION} | header, allow_nan=False)
+    write_whole(path, save(contiguous, metadata={KEY: text}))
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Tensors and header of a file by `write_tensors`. Raises CheckpointError where it is missing, damaged or
+    foreign."""
+    if not path.is_file():
+        raise CheckpointError(f"there is no checkpoint {path}: look for the name, or make one with `caldrive train`")
+    content = path.read_bytes()
+    try:
+        tensors = load(content)
+        size = struct.unpack("<Q", content[:8])[0]
+        metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__") or {}
+        header = read_json(metadata[KEY], dict[str, Any]) if KEY in metadata else None
+    except (SafetensorError, ValueError, struct.error) as error:
+        raise CheckpointError(f"{path} is damaged or no safetensors file: copy it again or train anew") from error
+    if header is None:
+        raise CheckpointError(f"{path} holds tensors, but no network of caldrive: give a file made by `caldrive train`")
+    if header.get("version") != FORMAT_VERSION:
+        found = header.get("version")
+        raise CheckpointError(
+            f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: train the network anew"
+        )
+    return tensors, header
+
+
+def _is_weight(value: Tensor) -> bool:
+    """Not a bias, nor a statistic of a batch norm."""
+    return value.is_floating_point() and value.dim() > 1
+
+
+def round_to_half(network: Network) -> None:
+    """Rounds a network's weights in place to what 16 bits can hold, so that it is measured as it is stored."""
+    for value in network.state_dict().values():
+        if _is_weight(value):
+            value.copy_(value.half())
+
+
+def save_network(path: Path | str, network: Network, info: CheckpointInfo, half: bool = False) -> None:
+    """Write a network; `half` stores weights, though not batch norm's statistics, in 16 bits."""
+    state = network.state_dict()
+    if half:
+        state = {k: v.half() if _is_weight(v) else v for k, v in state.items()}
+    write_tensors(Path(path), state, {"kind": "network", "specs": describe()} | asdict(info))
+
+
+def _read_network(path: Path) -> tuple[dict[str, Tensor], CheckpointInfo]:
+    """Weights, and what is known of them. Raises CheckpointError where they are no network of this code's kind."""
+    tensors, header = read_tensors(path)
+    if header.get("kind") != "network":
+        raise CheckpointError(
+            f"{path} is part of a training, no finished network: give the model.safetensors that it makes"
+        )
+    if header.get("specs") != json.loads(json.dumps(describe())):
+        raise CheckpointError(
+            f"{path} was trained for other affordances than this caldrive's six: train the network anew"
+        )
+    try:
+        known = {f.name: header[f.name] for f in fields(CheckpointInfo) if f.name in header}
+        return tensors, as_type(known, CheckpointInfo)
+    except (KeyError, TypeError, ValueError) as error:
+        raise CheckpointError(f"{path} has a header that cannot be read ({error}): train the network anew") from error
+
+
+def read_info(path: Path | str) -> CheckpointInfo:
+    """What is known of a network. Raises CheckpointError as `load_network`."""
+    return _read_network(Path(path))[1]
+
+
+def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
+    """Read a network, ready for evaluation, and what is known of it. Raises CheckpointError where it does not fit this
+    code."""
+    path = Path(path)
+    tensors, info = _read_network(path)
+    try:
+        network = Network(info.config)
+        network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise CheckpointError(
+            f"the weights in {path} do not fit its own configuration: train the network anew"
+        ) from error
+    if wrong := _wrong(network, info):
+        raise CheckpointError(f"{path} has {wrong}: train the network anew")
+    return network.eval(), info
+
+
+def _wrong(network: Network, info: CheckpointInfo) -> str:
+    """What is not as a training leaves it, or nothing."""
+    state = network.state_dict()
+    if not all(bool(value.isfinite().all()) for value in state.values()):
+        return "weights that are not numbers"
+    if any(bool((value < 0).any()) for name, value in state.items() if name.endswith("running_var")):
+        return "variances less than 0"
+    if not all(0 < one < math.inf for one in info.ranges):
+        return "ranges of integers that are not more than 0"
+    outputs = {spec.name: spec.outputs for spec in SPECS if spec.discrete}
+    counts = info.data.get("train_classes", {})
+    if any(len(count) != outputs.get(name) or min(count) < 0 or not sum(count) for name, count in counts.items()):
+        return "counts of other classes than this caldrive's"
+    return ""

@@ -1,0 +1,90 @@
+"""What the network learns: affordances as targets, their losses, and outputs turned back into affordances.
+
+Targets are what the network learns: a class number (int64) or a value divided by its scale (float32), each (N,).
+Outputs are what it gives: logits (N, K) of K classes or scaled values (N, 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
+from caldrive.affordances import SPECS, AffordanceSpec
+from caldrive.datatypes import Affordances
+
+Outputs = Mapping[str, Tensor]
+Targets = Mapping[str, Tensor]
+ClassWeights = Mapping[str, Tensor]
+
+
+def encode(spec: AffordanceSpec, values: NDArray[Any]) -> Tensor:
+    """Labels (N,) in SI units (a speed sign in km/h, 0 for none) as targets (N,)."""
+    if not spec.discrete:
+        return torch.from_numpy(np.clip(values, spec.low, spec.high) / spec.scale).float()
+    nearest = np.abs(np.asarray(values, dtype=float)[:, None] - np.array(spec.classes)).argmin(axis=1)
+    return torch.from_numpy(nearest)
+
+
+def si_values(spec: AffordanceSpec, output: Tensor) -> Tensor:
+    """Outputs (N, 1) as values (N,) in SI units, clipped to the affordance's range."""
+    return (output[:, 0].float() * spec.scale).clamp(spec.low, spec.high)
+
+
+def scaled_error(spec: AffordanceSpec, output: Tensor, target: Tensor) -> Tensor:
+    """Absolute errors (N,) of scaled outputs (N, 1). A target at a limit of the range stands for all beyond it, as
+    decoding does: an output there is right."""
+    beyond = (target >= spec.high / spec.scale) & (output[:, 0] > target)
+    beyond |= (target <= spec.low / spec.scale) & (output[:, 0] < target)
+    return (output[:, 0] - target).abs().masked_fill(beyond, 0.0)
+
+
+def decode(outputs: Outputs) -> Affordances:
+    """Outputs with N = 1 as affordances: probabilities by softmax, the likeliest sign, values in SI units."""
+    values: dict[str, Any] = {}
+    for spec in SPECS:
+        output = outputs[spec.name]
+        if spec.outputs > 2:
+            values[spec.name] = spec.classes[int(output[0].argmax())] or None
+        elif spec.discrete:
+            values[spec.name] = float(output[0].float().softmax(0)[1])
+        else:
+            values[spec.name] = float(si_values(spec, output)[0])
+    return Affordances(**values)
+
+
+def class_weights(counts: Mapping[str, NDArray[np.float64]]) -> dict[str, Tensor]:
+    """Weights (K,) inverse to the classes' counts, with mean 1 over the samples; a class that never occurs weighs 0."""
+    weights = {}
+    for name, count in counts.items():
+        inverse = np.where(count > 0, 1 / np.maximum(count, 1e-9), 0.0)
+        weights[name] = torch.from_numpy(inverse * count.sum() / (inverse * count).sum()).float()
+    return weights
+
+
+def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> dict[str, Tensor]:
+    """The loss of each affordance among the outputs: class-weighted cross-entropy, or mean absolute error of the scaled
+    value (section 3.1), where a target at a limit stands for all beyond it."""
+    result = {}
+    for spec in (spec for spec in SPECS if spec.name in outputs):
+        output, target = outputs[spec.name].float(), targets[spec.name]
+        if spec.discrete:
+            weight = None if weights is None else weights[spec.name]
+            # The mean over samples, not over weights: a batch's few rare samples must not take all of its gradient.
+            result[spec.name] = functional.cross_entropy(output, target, weight, reduction="none").mean()
+        else:
+            result[spec.name] = scaled_error(spec, output, target).mean()
+    return result
+
+
+def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None, angle_weight: float = 1.0) -> Tensor:
+    """The whole loss: those of all affordances added, the relative angle's times angle_weight."""
+    parts = losses(outputs, targets, weights)
+    if "relative_angle" in parts:
+        parts["relative_angle"] = angle_weight * parts["relative_angle"]
+    return torch.stack(list(parts.values())).sum()

@@ -1,0 +1,120 @@
+"""What a recording holds: labels counted and drawn as histograms, after all values and images could be read."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from caldrive.datatypes import Semantic
+from caldrive.files import read_json, write_figure
+from caldrive.progress import Progress, silent
+from caldrive.recordings.folder import class_counts, episode_paths, joined, repeated
+from caldrive.recordings.reader import Episode, read_episode
+from caldrive.recordings.writer import MANIFEST, EpisodeError, episode_path
+
+T = TypeVar("T")
+
+HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
+    "vehicle_distance": (np.linspace(0, 50, 26), "m"),
+    "relative_angle": (np.linspace(-0.8, 0.8, 41), "rad"),
+    "center_distance": (np.linspace(-2, 2, 41), "m"),
+    "speed": (np.linspace(0, 25, 26), "m/s"),
+}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What lies in a folder. minutes: simulated; weathers: episodes by weather; counts: frames by label and value;
+    damaged: a sentence for each file that is no use, or no use beside the others; missing: episodes that were asked for
+    and are not there."""
+
+    episodes: int
+    frames: int
+    minutes: float
+    weathers: dict[str, int]
+    counts: dict[str, dict[str, int]]
+    damaged: tuple[str, ...]
+    missing: int = 0
+
+
+def check_episode(path: Path) -> Episode:
+    """An episode whose every image can be decoded, all of one size. Raises EpisodeError where one cannot."""
+    episode = read_episode(path, semantic=True)
+    size = episode.image(0).shape[:2]
+    for row in range(len(episode)):
+        if episode.image(row).shape[:2] != size:
+            raise EpisodeError(f"row {row} of {path} has an image of another size than row 0: record again")
+        if episode.semantics is not None and episode.semantic(row, size).max() >= len(Semantic):
+            raise EpisodeError(f"row {row} of {path} has a semantic image with unknown classes: record again")
+    return replace(episode, semantics=None)
+
+
+def _missing(manifest: Path) -> int:
+    """How many of the episodes that `caldrive collect` was asked for are not in its folder. Raises EpisodeError where
+    nobody can read what was asked for."""
+    try:
+        asked = read_json(manifest.read_bytes(), dict[str, Any]).get("episodes", 0)
+        if asked < 0:
+            raise ValueError(f"{asked} episodes")
+        return sum(not episode_path(manifest.parent, k).is_file() for k in range(asked))
+    except (ValueError, TypeError) as error:
+        raise EpisodeError(f"{manifest} is damaged ({error}): record in another folder") from error
+
+
+def _of_another_size(episodes: list[Episode]) -> list[str]:
+    """A sentence for each episode whose images are not as large as most are."""
+    sizes = [episode.image(0).shape[:2] for episode in episodes]
+    (height, width), _ = Counter(sizes).most_common(1)[0] if sizes else ((0, 0), 0)
+    return [
+        f"{episode.path} has images of {w} x {h}, most have {width} x {height}: keep one size in a folder"
+        for episode, (h, w) in zip(episodes, sizes, strict=True)
+        if (h, w) != (height, width)
+    ]
+
+
+def _tried(check: Callable[[Path], T], paths: list[Path], progress: Progress = silent) -> tuple[list[T], list[str]]:
+    """What a check makes of the files that are sound, and a sentence for each of the others."""
+    sound, damaged = [], []
+    for k, path in enumerate(paths):
+        progress("checking", k / len(paths))
+        try:
+            sound.append(check(path))
+        except EpisodeError as error:
+            damaged.append(str(error))
+    return sound, damaged
+
+
+def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recording, list[Episode]]:
+    """Reads all episodes of a folder; returns what they hold, and those that are sound.
+
+    Raises EpisodeError where there is no episode at all.
+    """
+    sound, damaged = _tried(check_episode, episode_paths(folder), progress)
+    damaged += repeated(sound) + _of_another_size(sound)
+    missing, unknown = _tried(_missing, sorted(folder.glob(f"**/{MANIFEST}")))
+    minutes = sum(float(np.ptp(e.columns["time"])) for e in sound) / 60
+    weathers = Counter(str(e.scenario.weather) for e in sound)
+    counts = class_counts(sound) if sound else {}
+    return Recording(
+        len(sound), sum(map(len, sound)), minutes, dict(weathers), counts, (*damaged, *unknown), sum(missing)
+    ), sound
+
+
+def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], path: Path) -> None:
+    """A picture (PNG) of how often each value of each label occurs, all on one logarithmic scale of frames."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(16, 6), layout="constrained")
+    axes = figure.subplots(2, 5, sharey=True).ravel()
+    for ax, (name, values) in zip(axes, counts.items(), strict=False):
+        ax.bar([one.replace(" or ", " or\n") for one in values], list(values.values()), color="#3b6ea5")
+        ax.set(title=name.replace("_", " "), yscale="log", ylabel="frames")
+    for ax, (name, (bins, unit)) in zip(axes[len(counts) :], HISTOGRAMS.items(), strict=False):
+        ax.hist(joined(episodes, name), bins, color="#c8782d")
+        ax.set(title=name.replace("_", " "), yscale="log", xlabel=unit)
+    write_figure(path, figure)

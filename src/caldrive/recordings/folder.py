@@ -1,0 +1,93 @@
+"""Folders of recorded episodes: found, counted, and split into those that train and those that validate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.affordances import SPECS
+from caldrive.datatypes import HAZARD_DISTANCE
+from caldrive.recordings.reader import Episode, read_episode
+from caldrive.recordings.writer import EpisodeError
+
+
+def episode_paths(folder: Path | str) -> list[Path]:
+    """The files of a folder's episodes by name. Raises EpisodeError where there is none."""
+    paths = sorted(Path(folder).glob("**/*.parquet"))
+    if not paths:
+        raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
+    return paths
+
+
+def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
+    """All episodes of a folder by name; semantic: with their semantic images, where they have them.
+
+    Raises EpisodeError where there is none, one is damaged, or one is there twice.
+    """
+    episodes = [read_episode(path, semantic) for path in episode_paths(folder)]
+    if again := repeated(episodes):
+        raise EpisodeError(again[0])
+    return episodes
+
+
+def repeated(episodes: Sequence[Episode]) -> list[str]:
+    """A sentence for each episode that is there again: one that trains must not validate, too."""
+    first = {episode.key: episode for episode in reversed(episodes)}
+    again = [episode for episode in episodes if first[episode.key] is not episode]
+    return [
+        f"{one.path} has id, town, weather and seed of {first[one.key].path}: keep one, or record with another --seed"
+        for one in again
+    ]
+
+
+def joined(episodes: Sequence[Episode], name: str) -> NDArray[Any]:
+    """A column (N,) of all episodes, one after the other."""
+    return np.concatenate([episode.columns[name] for episode in episodes])
+
+
+def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
+    """How many frames of a recording have each value of the discrete affordances and of the command, turn each way in a
+    junction, and have to stop for a person or a car across and not for the car ahead."""
+    columns = {name: joined(episodes, name) for name in (*(s.name for s in SPECS if s.discrete), "command")}
+    columns["turn"] = columns["command"][joined(episodes, "junction")]
+    near = joined(episodes, "vehicle_distance")[columns["hazard_stop"] > 0] < HAZARD_DISTANCE
+    columns["hazard_by"] = np.where(near, "car ahead", "person or car across")
+    found = {}
+    for name, column in columns.items():
+        values, counts = np.unique(column, return_counts=True)
+        found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
+    return found
+
+
+def _short(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
+    """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for
+    each."""
+    if len(episodes) < 2:
+        raise EpisodeError(f"found {len(episodes)} episode, training and validation need one each: record more")
+    order = np.random.default_rng(seed).permutation(len(episodes))
+    n_held = min(max(1, round(share * len(episodes))), len(episodes) - 1)
+    held = set(order[:n_held].tolist())
+    return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
+
+
+def held_out(episodes: Sequence[Episode], keys: Sequence[str]) -> list[Episode]:
+    """The episodes that a network's training kept for validation. keys: theirs, as its checkpoint remembers them.
+
+    Raises EpisodeError where they are not all among these episodes.
+    """
+    wanted = set(keys)
+    found = [episode for episode in episodes if episode.key in wanted]
+    if not wanted or len(found) != len(wanted):
+        raise EpisodeError(
+            f"found {len(found)} of the {len(wanted)} episodes that the network's training kept for validation: give "
+            "the folder that it was trained on with --data, or leave --held-out away"
+        )
+    return found

@@ -1,0 +1,86 @@
+"""Shadows of buildings and trees, as heights: a point is in the shade where it lies lower than the shadow above it.
+
+That is a picture of the town from above whose value is a height, so one look-up shades road, façades, cars and people.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFilter
+
+from caldrive.geometry import box_corners
+from caldrive.world.scene.scenery import Prop
+
+RESOLUTION = 0.25  # m of one pixel
+MARGIN = 30.0  # m around the roads
+TALLEST = 32.0  # m, the value of a full pixel
+Heights = NDArray[np.uint8]  # in units of TALLEST / 255
+
+
+def _units(height: float) -> int:
+    return round(min(height / TALLEST, 1.0) * 255)
+
+
+def _drawn(props: Sequence[Prop], bounds: tuple[float, float, float, float], kind: str) -> Heights:
+    """Heights of the tops of all props of a kind, seen from above; row 0 at the lowest y."""
+    x0, y0, x1, y1 = bounds
+    size = (round((x1 - x0) / RESOLUTION), round((y1 - y0) / RESOLUTION))
+    picture = Image.new("L", size, 0)
+    draw = ImageDraw.Draw(picture)
+    for p in sorted((p for p in props if p.kind == kind), key=lambda p: p.height):
+        if kind == "tree":
+            r, x, y = 0.2 * p.height / RESOLUTION, (p.pose.x - x0) / RESOLUTION, (p.pose.y - y0) / RESOLUTION
+            draw.ellipse((x - r, y - r, x + r, y + r), fill=_units(0.8 * p.height))
+        else:
+            corners = (box_corners(p.pose, p.length, p.width) - (x0, y0)) / RESOLUTION
+            draw.polygon([(u, v) for u, v in corners.tolist()], fill=_units(p.height))
+    return np.asarray(picture)
+
+
+def _shifted(heights: Heights, columns: int, rows: int) -> Heights:
+    """The picture seen from a pixel that lies (columns, rows) away, 0 beyond the edges."""
+    moved = np.zeros_like(heights)
+    h, w = heights.shape
+    to_x, from_x = slice(max(0, -columns), min(w, w - columns)), slice(max(0, columns), min(w, w + columns))
+    to_y, from_y = slice(max(0, -rows), min(h, h - rows)), slice(max(0, rows), min(h, h + rows))
+    if abs(columns) < w and abs(rows) < h:
+        moved[to_y, to_x] = heights[from_y, from_x]
+    return moved
+
+
+def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
+    """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the fall."""
+    flat = float(np.hypot(sun[0], sun[1]))
+    fall, shade = float(sun[2]) / flat * 255 / TALLEST, heights.copy()
+    reach, step = float(heights.max()) / fall, RESOLUTION
+    while step < reach:
+        columns, rows = (round(step * float(s) / flat / RESOLUTION) for s in sun[:2])
+        lower = np.uint8(min(255, round(step * fall)))
+        np.maximum(shade, np.maximum(_shifted(shade, columns, rows), lower) - lower, out=shade)
+        step *= 2
+    return shade
+
+
+def town_bounds(roads_bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    """The rectangle that the shadow picture covers."""
+    x0, y0, x1, y1 = roads_bounds
+    return x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
+
+
+def _softened(heights: Heights) -> Heights:
+    """Rounds off the steps that pixels leave along slanting edges."""
+    soft = np.array(Image.fromarray(heights).filter(ImageFilter.BoxBlur(2)))
+    soft[[0, -1]] = soft[:, [0, -1]] = 0  # the edge stands for everything beyond
+    return soft
+
+
+def shadow_heights(
+    props: Sequence[Prop], bounds: tuple[float, float, float, float], sun: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """Shadow heights (rows, columns, 2) in units of TALLEST / 255: of buildings with trees, of buildings alone."""
+    houses = cast(_drawn(props, bounds, "building"), sun)
+    trees = cast(_drawn(props, bounds, "tree"), sun)
+    return np.stack((_softened(np.maximum(houses, trees)), _softened(houses)), axis=-1)

@@ -1,0 +1,114 @@
+"""The texture array: all surfaces, façades and signs, drawn once at start from a fixed seed."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from caldrive.world.scene import facades
+from caldrive.world.scene.patterns import RGB, SIZE, Layer, asphalt, flipped, leaves, paving, speckled
+
+
+class Tex(IntEnum):
+    """Layers of the array."""
+
+    PLAIN = 0
+    ASPHALT = 1
+    SLABS = 2
+    BRICKS = 3
+    GRASS = 4
+    GRAVEL = 5
+    LEAVES = 6
+    NEEDLES = 7
+    TILES = 8
+    SASH = 9  # town01: tall windows with shutters
+    PANE = 10  # town01: small cross-barred windows
+    BALCONY = 11  # town01: windows with balconies
+    SHOP = 12  # town01: ground floor with shop windows
+    HALL = 13  # town01: ground floor with doors
+    GLASS = 14  # town02: curtain wall
+    BAND = 15  # town02: ribbon windows
+    LOFT = 16  # town02: brick with factory windows
+    LOBBY = 17  # town02: glazed ground floor
+    DOCK = 18  # town02: ground floor with gates
+    SIGN_30 = 19
+    SIGN_60 = 20
+    SIGN_90 = 21
+    POSTER_A = 22
+    POSTER_B = 23
+    PLATES = 24
+    SETTS = 25
+    PLANKS = 26
+    CONCRETE = 27
+    INVENTED_A = 28  # façades of nowhere, for decors made up at random
+    INVENTED_B = 29
+    INVENTED_C = 30
+    INVENTED_D = 31
+    INVENTED_E = 32
+    INVENTED_F = 33
+
+
+SIGN_LAYERS = {30: Tex.SIGN_30, 60: Tex.SIGN_60, 90: Tex.SIGN_90}
+_FACADES = {
+    Tex.SASH: facades.sash,
+    Tex.PANE: facades.pane,
+    Tex.BALCONY: facades.balcony,
+    Tex.SHOP: facades.shop,
+    Tex.HALL: facades.hall,
+    Tex.GLASS: facades.glass,
+    Tex.BAND: facades.band,
+    Tex.LOFT: facades.loft,
+    Tex.LOBBY: facades.lobby,
+    Tex.DOCK: facades.dock,
+}
+
+
+def _sign(limit: int) -> Layer:
+    """A round sign: white, a red ring, the limit in bold digits as wide as the white allows."""
+    big = 4 * SIZE
+    picture = Image.new("RGB", (big, big), (192, 20, 28))
+    draw = ImageDraw.Draw(picture)
+    rim = int(0.105 * big)
+    draw.ellipse((rim, rim, big - rim, big - rim), fill=(250, 250, 248))
+    font = ImageFont.load_default(int(0.60 * big))
+    ink = (8, 8, 10)
+    draw.text((big / 2, big / 2), str(limit), ink, font, anchor="mm", stroke_width=big // 36, stroke_fill=ink)
+    return flipped(picture.resize((SIZE, SIZE), Image.Resampling.BOX))
+
+
+def _poster(ground: RGB, mark: RGB, word: str) -> Layer:
+    picture = Image.new("RGB", (SIZE, SIZE), ground)
+    draw = ImageDraw.Draw(picture)
+    draw.ellipse((SIZE * 0.3, SIZE * 0.08, SIZE * 0.7, SIZE * 0.48), fill=mark)
+    draw.text((SIZE / 2, SIZE * 0.72), word, mark, ImageFont.load_default(SIZE // 4), anchor="mm", stroke_width=1)
+    return flipped(picture)
+
+
+def texture_layers() -> NDArray[np.uint8]:
+    """All layers (34, SIZE, SIZE, 3), bottom row first, in the order of `Tex`."""
+    rng = np.random.default_rng(20180614)
+    plain = np.full((SIZE, SIZE, 3), 255, np.uint8)
+    layers = {
+        Tex.PLAIN: plain,
+        Tex.ASPHALT: asphalt(rng),
+        Tex.SLABS: paving((196, 192, 186), 0.72, 4, 4, rng),
+        Tex.BRICKS: paving((208, 196, 190), 0.74, 12, 6, rng),
+        Tex.GRASS: leaves((112, 138, 74), rng, 8),
+        Tex.GRAVEL: speckled((176, 162, 136), rng, 0.14, 0.10, 8),
+        Tex.LEAVES: leaves((226, 232, 214), rng, 10),
+        Tex.NEEDLES: leaves((214, 222, 214), rng, 20),
+        Tex.TILES: paving((214, 206, 202), 0.66, 12, 8, rng),
+        **{layer: draw(rng) for layer, draw in _FACADES.items()},
+        **{layer: _sign(limit) for limit, layer in SIGN_LAYERS.items()},
+        Tex.POSTER_A: _poster((222, 176, 58), (60, 44, 40), "JAZZ"),
+        Tex.POSTER_B: _poster((58, 110, 128), (238, 236, 220), "EXPO"),
+        Tex.PLATES: paving((214, 212, 208), 0.8, 2, 2, rng),
+        Tex.SETTS: paving((206, 204, 200), 0.6, 10, 10, rng),
+        Tex.PLANKS: paving((212, 206, 198), 0.7, 12, 1, rng),
+        Tex.CONCRETE: speckled((206, 204, 202), rng, 0.05, 0.16, 4),
+        **{layer: facades.invented(rng) for layer in Tex if layer.name.startswith("INVENTED")},
+    }
+    return np.stack([layers[t] for t in Tex])

@@ -1,0 +1,86 @@
+"""A loaded town as a value: its roads, signs, buildings and everything else that stands still."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from caldrive.datatypes import ContactKind, Points, Sign
+from caldrive.geometry import wrap_angle
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.route import Route
+from caldrive.world.roads.towns import load_roads
+from caldrive.world.scene.decor import Decor
+from caldrive.world.scene.domain_randomisation import randomised_decor, shown_signs
+from caldrive.world.scene.scenery import Prop, build_scenery
+from caldrive.world.traffic.collisions import Obstacle
+from caldrive.world.truth.ground_raster import GroundRaster
+
+CLOSE = 4.0  # m from the ego's centre to an obstacle's edge within which a contact is looked for
+SIGN_BESIDE = (-7.0, -1.0)  # m left of the route where a sign that counts for it stands
+
+
+class Obstacles:
+    """What stands still and can be hit, with an index of where it is."""
+
+    def __init__(self, scenery: tuple[Prop, ...]) -> None:
+        solid = [prop for prop in scenery if prop.solid]
+        self._things = [
+            Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)
+        ]
+        self._at: Points = np.array([(o.pose.x, o.pose.y) for o in self._things]).reshape(-1, 2)
+        self._reach = np.array([np.hypot(o.length, o.width) / 2 for o in self._things])
+
+    def near(self, x: float, y: float) -> list[Obstacle]:
+        """Those that a car with its centre here may touch."""
+        distance = np.hypot(self._at[:, 0] - x, self._at[:, 1] - y) - self._reach
+        return [self._things[i] for i in np.flatnonzero(distance < CLOSE)]
+
+
+@dataclass(frozen=True, eq=False)
+class Town:
+    """Everything in a town that stands still. appearance: number of a random look (houses, trees, colours, sun, limits
+    of the fast streets), 0 for the town's own."""
+
+    name: str
+    appearance: int
+    roads: RoadNetwork
+    signs: tuple[Sign, ...]
+    scenery: tuple[Prop, ...]
+    decor: Decor
+    ground: GroundRaster
+    obstacles: Obstacles
+
+    def limits_along(self, route: Route) -> list[tuple[float, float]]:
+        """Where which limit begins along a route (m, km/h)."""
+        limits = [(0.0, self.roads.lanes[route.lanes[0][0]].limit)]
+        low, high = SIGN_BESIDE
+        for sign in self.signs:
+            hit = route.line.project(sign.pose.x, sign.pose.y)
+            if low < hit.left < high and abs(wrap_angle(hit.heading - sign.pose.heading)) < 0.5:
+                limits.append((hit.s, float(sign.limit)))
+        return sorted(limits)
+
+
+@lru_cache(maxsize=2)
+def _ground(roads: RoadNetwork) -> GroundRaster:
+    return GroundRaster(roads)
+
+
+@lru_cache(maxsize=2)
+def load_town(name: str, appearance: int = 0) -> Town:
+    """A town by name or OpenDRIVE file. Raises ValueError or FileNotFoundError where there is none."""
+    roads = load_roads(name)
+    scenery = build_scenery(roads, appearance)
+    return Town(
+        name=name,
+        appearance=appearance,
+        roads=roads,
+        signs=shown_signs(roads.signs, appearance),
+        scenery=scenery,
+        decor=randomised_decor(roads.style, appearance),
+        ground=_ground(roads),
+        obstacles=Obstacles(scenery),
+    )

@@ -1,0 +1,126 @@
+"""When which traffic light is green: one approach of a junction at a time, and only while somebody waits there.
+
+One approach at a time, as in CARLA, needs no yielding to oncoming traffic, which nobody who drives by the six
+affordances could do. The lights are actuated (loops in the road before the stop line) because the protocol's time limit
+leaves a lawful driver of a short route room for one wait only.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
+from caldrive.world.roads.network import LightPost, RoadNetwork
+
+SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
+YELLOW = 3.5  # s: a car that starts to brake for it and loses sight of it in A1 still gets through
+SHORTEST_CLEARING, LONGEST_CLEARING = 1.0, 20.0  # s with all lights red, until nobody is left inside the junction
+LOOP = 24.0  # m before the stop line where somebody who waits is noticed
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Which approach has its turn, what it shows, and since when (s)."""
+
+    approach: int
+    state: LightState
+    since: float
+
+
+def next_phase(phase: Phase, time: float, waiting: list[bool], occupied: bool) -> Phase:
+    """The phase after a look at who waits at which approach, and whether the junction is occupied."""
+    lasted = time - phase.since
+    others = [k for k in _order_after(phase.approach, len(waiting)) if waiting[k]]
+    if phase.state is LightState.GREEN:
+        enough = LONGEST_GREEN if waiting[phase.approach] else SHORTEST_GREEN
+        return Phase(phase.approach, LightState.YELLOW, time) if others and lasted >= enough else phase
+    if phase.state is LightState.YELLOW:
+        return Phase(phase.approach, LightState.RED, time) if lasted >= YELLOW else phase
+    cleared = lasted >= (LONGEST_CLEARING if occupied else SHORTEST_CLEARING)
+    if not cleared:
+        return phase
+    return Phase(others[0] if others else phase.approach, LightState.GREEN, time)
+
+
+def _order_after(k: int, n: int) -> list[int]:
+    return [(k + i) % n for i in range(1, n)]
+
+
+class Junction:
+    """The lights of one junction. posts: its approaches in the order of their turns."""
+
+    def __init__(self, posts: tuple[LightPost, ...], phase: Phase) -> None:
+        self.posts = posts
+        self.change(phase)
+
+    def change(self, phase: Phase) -> None:
+        """Shows a phase; lights stay the same objects as long as it lasts."""
+        self.phase = phase
+        self.lights = tuple(
+            TrafficLight(post.id, post.pose, state, post.stop_line)
+            for post, state in zip(self.posts, self.states(), strict=True)
+        )
+
+    def states(self) -> list[LightState]:
+        """What each post shows."""
+        return [self.phase.state if i == self.phase.approach else LightState.RED for i in range(len(self.posts))]
+
+
+class _Detectors:
+    """Loops before all stop lines and inside all junctions, looked at in one go."""
+
+    def __init__(self, junctions: Iterable[Junction]) -> None:
+        groups = [np.array([np.mean(post.stop_line, axis=0) for post in junction.posts]) for junction in junctions]
+        self.stops = np.concatenate(groups)
+        headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
+        self.forward = np.stack((np.cos(headings), np.sin(headings)), axis=-1)
+        self.centers = np.array([stops.mean(0) for stops in groups])
+        self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
+
+    def look(self, poses: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Who waits at which post (in order), and which junctions are occupied; poses: x, y, heading of (N, 3) cars."""
+        d = poses[None, :, :2] - self.stops[:, None]
+        u, v = self.forward[:, None, 0], self.forward[:, None, 1]
+        ahead, left = d[..., 0] * u + d[..., 1] * v, d[..., 1] * u - d[..., 0] * v
+        same_way = np.cos(poses[:, 2]) * u + np.sin(poses[:, 2]) * v > 0.7
+        waiting = ((ahead > -LOOP - 2.0) & (ahead < 0.5) & (np.abs(left) < 2.0) & same_way).any(1)
+        away = np.hypot(*np.moveaxis(poses[None, :, :2] - self.centers[:, None], -1, 0))
+        return waiting, (away < self.radii[:, None] - 4.0).any(1)
+
+
+class Lights:
+    """All traffic lights of a town; who has the first green is drawn from rng."""
+
+    def __init__(self, roads: RoadNetwork, rng: np.random.Generator) -> None:
+        grouped: dict[str, list[LightPost]] = defaultdict(list)
+        for post in roads.posts:
+            grouped[post.light].append(post)
+        self.junctions = {
+            name: Junction(
+                tuple(posts), Phase(int(rng.integers(len(posts))), LightState.GREEN, -float(rng.uniform(0, 4)))
+            )
+            for name, posts in sorted(grouped.items())
+        }
+        self._detectors = _Detectors(self.junctions.values()) if self.junctions else None
+
+    def step(self, time: float, cars: Iterable[VehicleState]) -> None:
+        """Moves all junctions on to a time (s), given everybody who drives."""
+        if self._detectors is None:
+            return
+        waiting, occupied = self._detectors.look(np.array([(c.pose.x, c.pose.y, c.pose.heading) for c in cars]))
+        first = 0
+        for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
+            last = first + len(junction.posts)
+            phase = next_phase(junction.phase, time, waiting[first:last].tolist(), busy)
+            if phase is not junction.phase:
+                junction.change(phase)
+            first = last
+
+    def shown(self) -> tuple[TrafficLight, ...]:
+        """Every light with what it shows."""
+        return tuple(light for junction in self.junctions.values() for light in junction.lights)

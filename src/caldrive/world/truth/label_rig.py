@@ -1,0 +1,117 @@
+"""The labels of one episode: for the ego, and for a car that stands where another camera looks from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from caldrive.datatypes import (
+    Affordances,
+    Alternative,
+    CameraConfig,
+    Contact,
+    PedestrianState,
+    Points,
+    Pose,
+    Sign,
+    TrafficLight,
+    Truth,
+    VehicleState,
+)
+from caldrive.geometry import moved, to_local
+from caldrive.scenarios import Scenario
+from caldrive.world.roads.route import Route
+from caldrive.world.town import Town
+from caldrive.world.truth.labels import label
+from caldrive.world.truth.other_commands import Fork, alternatives, forks
+
+IN_REACH = 40.0  # m within which signs and lights are looked at
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Who and what is where. progress: metres of the route that the ego has driven."""
+
+    time: float
+    ego: VehicleState
+    vehicles: tuple[VehicleState, ...]
+    pedestrians: tuple[PedestrianState, ...]
+    lights: tuple[TrafficLight, ...]
+    contacts: tuple[Contact, ...]
+    progress: float
+
+
+class LabelRig:
+    """Labels along a route through a town. front_axle: m from the ego's centre to its front axle."""
+
+    def __init__(self, town: Town, route: Route, scenario: Scenario, front_axle: float) -> None:
+        self.town, self.route, self.scenario, self.front_axle = town, route, scenario, front_axle
+        self._limits = town.limits_along(route)
+        self._signs_at = _positions(town.signs)
+        self._lights_at: Points | None = None  # lights stay where they are
+
+    @cached_property
+    def _forks(self) -> list[Fork]:
+        return forks(self.town.roads, self.route)
+
+    def label(self, ego: VehicleState, moment: Moment) -> Affordances:
+        """The affordances of a car at a moment."""
+        if self._lights_at is None:
+            self._lights_at = _positions(moment.lights)
+        return label(
+            ego,
+            self.front_axle,
+            self.route.line,
+            near=moment.progress,
+            vehicles=moment.vehicles,
+            pedestrians=moment.pedestrians,
+            lights=[moment.lights[i] for i in _near(ego.pose, self._lights_at)],
+            signs=[self.town.signs[i] for i in _near(ego.pose, self._signs_at)],
+        )
+
+    def label_at(self, mount: CameraConfig, moment: Moment) -> Affordances:
+        """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
+        return self.label(replace(moment.ego, pose=_under(moment.ego.pose, mount)), moment)
+
+    def other_commands_at(self, mount: CameraConfig, moment: Moment) -> list[Alternative]:
+        """What other commands would ask of such a car, where others could be given."""
+        axle = moved(_under(moment.ego.pose, mount), forward=self.front_axle)
+        return alternatives(axle, self._forks, moment.progress)
+
+    def truth(self, moment: Moment) -> Truth:
+        """All that is true of a moment."""
+        ego, goal = moment.ego, self.scenario.goal
+        travel = self.route.line.heading_at(moment.progress)
+        opposite, sidewalk = self.town.ground.shares(ego, travel)
+        return Truth(
+            time=moment.time,
+            ego=ego,
+            affordances=self.label(ego, moment),
+            vehicles=moment.vehicles,
+            pedestrians=moment.pedestrians,
+            lights=moment.lights,
+            contacts=moment.contacts,
+            opposite_share=opposite,
+            sidewalk_share=sidewalk,
+            route_done=min(moment.progress, self.route.length),
+            route_length=self.route.length,
+            goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
+            speed_limit=[limit for s, limit in self._limits if s <= moment.progress + 0.1][-1],
+        )
+
+
+def _positions(things: Sequence[Sign] | Sequence[TrafficLight]) -> Points:
+    return np.array([(thing.pose.x, thing.pose.y) for thing in things]).reshape(-1, 2)
+
+
+def _near(here: Pose, positions: Points) -> list[int]:
+    """Which of the positions lie within a square around here."""
+    return np.flatnonzero(np.abs(positions - (here.x, here.y)).max(axis=1, initial=0.0) < IN_REACH).tolist()
+
+
+def _under(ego: Pose, mount: CameraConfig) -> Pose:
+    """Of the car whose camera, in the middle and straight ahead, would take the picture that this one takes."""
+    return moved(moved(ego, mount.forward, mount.left, mount.yaw), forward=-mount.forward)

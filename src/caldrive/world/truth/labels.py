@@ -1,0 +1,154 @@
+"""The true affordances, by the observation areas of supplement 2.1: a pure function of who and what is where.
+
+The areas are rectangles in the frame of the front axle: x ahead of its middle, y to the left. The same function labels
+any simulator that can say where things are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.datatypes import (
+    MAX_CENTER_DISTANCE,
+    MAX_VEHICLE_DISTANCE,
+    Affordances,
+    LightState,
+    PedestrianState,
+    Points,
+    Pose,
+    Sign,
+    TrafficLight,
+    VehicleState,
+)
+from caldrive.geometry import Polyline, box_corners, moved, polygon_distance, to_local, wrap_angle
+
+IN_VIEW = 5.0  # m from which on a light stands too high to be seen
+REACTION, BRAKE = 0.2, 6.0  # s and m/s²: what stopping before a light takes
+STRIP = 1.3  # m to either side of the route: half a car and some room
+FACING = math.radians(45)  # a sign or light counts for traffic that runs within this angle of the one it faces
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle ahead of the front axle in metres: near..far forward, right..left sideways (+ left)."""
+
+    near: float
+    far: float
+    right: float
+    left: float
+
+    def contains(self, points: Points) -> NDArray[np.bool_]:
+        x, y = points[..., 0], points[..., 1]
+        return np.asarray((x >= self.near) & (x <= self.far) & (y >= self.right) & (y <= self.left))
+
+
+# The table in supplement 2.1. Its text calls x the lateral axis, but its numbers are (forward, left).
+A1 = Area(7.4, 14.0, -5.8, -0.8)
+
+A2 = Area(0.0, 8.2, -2.0, 2.0)
+
+A3 = Area(0.0, 50.0, -1.6, 1.6)
+
+
+def _positions(things: Sequence[VehicleState] | Sequence[PedestrianState] | Sequence[Sign]) -> Points:
+    return np.array([(t.pose.x, t.pose.y) for t in things], dtype=float).reshape(-1, 2)
+
+
+def hazard_stop(axle: Pose, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState]) -> bool:
+    """Whether the centre of a car or a person lies in A2."""
+    both = np.concatenate((_positions(vehicles), _positions(pedestrians)))
+    return bool(A2.contains(to_local(axle, both)).any())
+
+
+def light_area(speed: float) -> Area:
+    """A1, and nearer than that what a car at this speed (m/s) can still stop in with the light in view.
+
+    A1 ends with the bumper 6.6 m before the line: who is slow and brakes there for a yellow light stands outside it,
+    where no affordance would tell him of the red one that follows.
+    """
+    return replace(A1, near=min(A1.near, IN_VIEW + REACTION * speed + speed**2 / (2 * BRAKE)))
+
+
+def red_light(axle: Pose, lights: Sequence[TrafficLight], speed: float) -> bool:
+    """Whether a light that faces the ego and is not green stands in the area for this speed (m/s). Yellow counts, as it
+    asks to stop."""
+    area = light_area(speed)
+    for light in lights:
+        if light.state is LightState.GREEN or abs(wrap_angle(light.pose.heading - axle.heading)) > FACING:
+            continue
+        if area.contains(to_local(axle, np.array([light.pose.x, light.pose.y]))):
+            return True
+    return False
+
+
+def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
+    """The limit on the nearest sign in A1 that faces the ego, in km/h."""
+    local = to_local(axle, _positions(signs))
+    seen = [
+        (x, sign.limit)
+        for x, inside, sign in zip(local[:, 0], A1.contains(local), signs, strict=True)
+        if inside and abs(wrap_angle(sign.pose.heading - axle.heading)) <= FACING
+    ]
+    return min(seen)[1] if seen else None
+
+
+def in_the_way(vehicle: VehicleState, route: Polyline, near: float | None) -> bool:
+    """Whether a car's box reaches into the strip that the ego sweeps along its route.
+
+    The areas are straight, and in a turn they sweep over cars that wait in the opposite lane: who stopped for those
+    would stand until they left, while they wait for the ego to clear the junction.
+    """
+    hit = route.project(vehicle.pose.x, vehicle.pose.y, near, window=MAX_VEHICLE_DISTANCE + 15.0)
+    across = abs(math.sin(vehicle.pose.heading - hit.heading)) * vehicle.length / 2
+    across += abs(math.cos(vehicle.pose.heading - hit.heading)) * vehicle.width / 2
+    return abs(hit.left) - across < STRIP
+
+
+def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleState]) -> float:
+    """Shortest distance between the boxes of the ego and the closest car whose centre is in A3, else 50 m."""
+    ahead = np.flatnonzero(A3.contains(to_local(axle, _positions(vehicles))))
+    own = box_corners(ego.pose, ego.length, ego.width)
+    gaps = [polygon_distance(own, box_corners(v.pose, v.length, v.width)) for v in (vehicles[int(i)] for i in ahead)]
+    return min([*gaps, MAX_VEHICLE_DISTANCE])
+
+
+def to_line(axle: Pose, line: Polyline, near: float | None = None) -> tuple[float, float, float]:
+    """Relative angle (rad) and centre distance (m, without its limits) of a front axle from a line, both positive where
+    the wheel has to go left, and the arc length of the line there."""
+    hit = line.project(axle.x, axle.y, near)
+    return wrap_angle(hit.heading - axle.heading), -hit.left, hit.s
+
+
+def label(
+    ego: VehicleState,
+    front_axle: float,
+    route: Polyline,
+    near: float | None = None,
+    vehicles: Sequence[VehicleState] = (),
+    pedestrians: Sequence[PedestrianState] = (),
+    lights: Sequence[TrafficLight] = (),
+    signs: Sequence[Sign] = (),
+) -> Affordances:
+    """The six affordances (Fig. 3).
+
+    front_axle: metres from the ego's centre to its front axle. route: the line of the command. near: arc length near
+    which the ego is on it, if known. Distance and angle are those from car to line: both are positive where the wheel
+    has to go left. Cars count in A2 and A3 only where they are in the way.
+    """
+    axle = moved(ego.pose, forward=front_axle)
+    angle, distance, s = to_line(axle, route, near)
+    ahead = A3.contains(to_local(axle, _positions(vehicles))) | A2.contains(to_local(axle, _positions(vehicles)))
+    vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, s)]
+    return Affordances(
+        hazard_stop=float(hazard_stop(axle, vehicles, pedestrians)),
+        red_light=float(red_light(axle, lights, ego.speed)),
+        speed_sign=speed_sign(axle, signs),
+        vehicle_distance=vehicle_distance(ego, axle, vehicles),
+        relative_angle=angle,
+        center_distance=float(np.clip(distance, -MAX_CENTER_DISTANCE, MAX_CENTER_DISTANCE)),
+    )

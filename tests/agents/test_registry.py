@@ -1,0 +1,37 @@
+"""The agents that commands drive with: the network that ships, where its car was put."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from caldrive.agents.cal import CALAgent
+from caldrive.agents.registry import SHIPPED_MODEL
+from caldrive.agents.settings import AgentSettings
+from caldrive.driving.setup import set_up
+from caldrive.driving.tasks import scenarios
+from caldrive.interfaces import is_recordable
+
+
+def test_the_network_that_ships_is_small() -> None:
+    assert SHIPPED_MODEL.stat().st_size < 10e6
+
+
+@pytest.mark.parametrize("aside", [-1.0, 1.5, 3.5])
+def test_the_network_that_ships_knows_how_far_aside_it_is_and_comes_back(aside: float) -> None:
+    world, agent = set_up(AgentSettings(cap=20.0))
+    assert is_recordable(world)
+    assert isinstance(agent, CALAgent)
+    for scenario in scenarios("town01", "straight", weather=8)[:2]:
+        world.reset(scenario)
+        observation, seen = world.displace(aside, 0.0), []
+        agent.reset()
+        for _ in range(80):
+            control = agent.act(observation)
+            assert agent.decision is not None
+            assert agent.decision.affordances is not None
+            seen.append(agent.decision.affordances.center_distance)
+            observation = world.step(control)
+        assert np.mean(seen[:5]) == pytest.approx(max(-2.0, -aside), abs=0.3)
+        assert abs(world.truth().affordances.center_distance) < 0.2
+    world.close()

@@ -1,0 +1,257 @@
+"""The report: its figures as text, and the page in a real browser."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import io
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import simplejpeg
+from rich.console import Console
+
+from caldrive.benchmark.evidence import trace_path
+from caldrive.benchmark.report import page as page_module
+from caldrive.benchmark.report.figures import _error_sums
+from caldrive.benchmark.report.page import report_page, report_text
+from caldrive.benchmark.report.runs import BenchmarkRun, failures, load_run, load_runs
+from caldrive.benchmark.report.tables import tables
+from caldrive.benchmark.suites import Driven, suite
+from caldrive.commands.tables import benchmark_table
+from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome, result_values
+from tests.benchmark.traces import after, trace
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+ABOUT: dict[str, Any] = {
+    "suite": "quick", "agent": "cal", "model": "abc", "cap": 20.0, "code": "123", "began": "2026-01-02T03:04:05+00:00",
+    "machine": "two cores", "seed": 0, "time_limit": "paper", "controller": "default", "model_file": None,
+    "suite_content": None, "precision": "int8", "workers": 2,
+}  # fmt: skip
+COMFORT = {
+    "center_distance": 0.05, "jerk": 0.4, "lateral_straight": 0.1, "lateral_turn": 0.2, "turning": 10.0,
+    "comfortable": 0.9,
+}  # fmt: skip
+FIGURES: dict[str, Any] = {
+    "reds_obeyed": 3, "off_lane": 0.0, "error/hazard_stop": 0.01, "error/red_light": 0.0,
+    "error/speed_sign": 0.02, "error/vehicle_distance": 0.5, "error/relative_angle": 0.02,
+    "error/center_distance": 0.1, "before/0/relative_angle": 0.3, "before/0/hazard_stop": 0.5,
+}  # fmt: skip
+
+
+def run(name: str, folder: Path) -> BenchmarkRun:
+    """The quick suite, driven well but for every fifth episode."""
+    driven = []
+    for k, trial in enumerate(suite("quick")):
+        bad = k % 5 == 4
+        kind = InfractionKind.SIDEWALK if k % 2 else InfractionKind.RED_LIGHT
+        broken = (Infraction(kind, 12.5, 100.0, 90.0),) if bad else ()
+        outcome = Outcome.TIMEOUT if k % 10 == 4 else Outcome.SUCCESS
+        result = EpisodeResult(trial.scenario, outcome, 50.0, 250.0, 200.0, 250.0, broken, COMFORT)
+        driven.append(Driven(trial, result, FIGURES))
+    return BenchmarkRun(name, folder, ABOUT | {"agent": name}, tuple(driven))
+
+
+def test_names_with_brackets_stand_in_the_terminals_tables_as_they_are(tmp_path: Path) -> None:
+    (one, *_) = run("cal", tmp_path).driven
+    trial = replace(one.trial, condition="[/wet]", scenario=replace(one.trial.scenario, task="[bold]turn"))
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(benchmark_table([replace(one, trial=trial)], "out/[red]"))
+    said = console.export_text()
+    assert said.count("[/wet]") == 2
+    assert "[bold]turn" in said
+    assert "out/[red]" in said
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
+    made = [run(name, tmp_path_factory.mktemp(name)) for name in ("oracle", "cal")]
+    still = made[1].folder / "stills" / f"{made[1].driven[4].trial.key}-0.jpg"
+    still.parent.mkdir()
+    still.write_bytes(simplejpeg.encode_jpeg(np.full((20, 40, 3), 90, np.uint8)))
+    left = {"trace": trace(true_center_distance=after(200, 1.5), command="left")}
+    kept = trace_path(made[1].folder, made[1].driven[4].trial.key)
+    kept.parent.mkdir()
+    kept.write_bytes(gzip.compress(json.dumps(left).encode()))
+    return made
+
+
+def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
+    table = next(one for one in tables(runs) if one.title == "How missed goals began")
+    town = runs[1].driven[4].trial.scenario.town
+    assert table.rows == (("cal", town, "left its lane", "(100, 0)", "left", "1"),)
+    text = "left its lane at (100, 0), left: relative angle off by 0.00 rad"
+    assert text in report_text(runs)
+    assert text in report_page(runs)
+
+
+def test_every_cell_stands_beside_the_papers(runs: list[BenchmarkRun]) -> None:
+    success = next(one for one in tables(runs) if one.title == "Success")
+    row = dict(zip(success.head, next(r for r in success.rows if r[:2] == ("new town", "navigation")), strict=True))
+    assert row["CAL (paper)"] == "70"
+    assert row["MP (paper)"] == "24"
+    assert "of 2" in row["cal %"]
+    assert len(success.rows) == 16
+
+
+def test_infractions_stand_beside_table_2(runs: list[BenchmarkRun]) -> None:
+    found = next(one for one in tables(runs) if one.title == "Infractions")
+    row = next(r for r in found.rows if r[:3] == ("new weather", "navigation-dynamic", "opposite lane"))
+    assert row[3].startswith("> ")
+    assert row[-1] == ">60"
+    row = next(r for r in found.rows if r[:3] == ("new weather", "all", "opposite lane"))
+    assert row[-4:] == ("", "", "", "")  # the paper counts in one task only
+
+
+def test_failures_say_what_was_wrong_before(runs: list[BenchmarkRun]) -> None:
+    found = failures(runs)
+    assert len(found) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].driven)))
+    assert found[0].before == ("relative angle 0.30 rad, hazard stop 50 %",)
+
+
+def test_the_text_holds_all_tables_and_failures(runs: list[BenchmarkRun]) -> None:
+    text = report_text(runs)
+    for table in tables(runs):
+        assert f"## {table.title}" in text
+    listed = text.split("## Failures")[1]
+    assert listed.count("| cal | town0") == len(failures(runs)) // 2
+    assert "caldrive benchmark --suite quick --agent cal --cap 20" in text
+
+
+def test_the_command_says_all_that_is_not_usual(runs: list[BenchmarkRun]) -> None:
+    about = {"seed": 3, "time_limit": "code", "controller": "paper", "cap": None, "model_file": "/a/b.safetensors"}
+    assert replace(runs[0], about=runs[0].about | about).command == (
+        "caldrive benchmark --suite quick --agent oracle --signs --controller paper --time-limit code --seed 3 "
+        "--model /a/b.safetensors --out DIR"
+    )
+
+
+def test_runs_of_one_agent_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    (trial, *_) = suite("quick")
+    result = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), COMFORT)
+    folders = [tmp_path / "a" / "cal", tmp_path / "b" / "cal"]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        (folder / "run.json").write_text(json.dumps(ABOUT))
+        line = {"key": trial.key, "result": result_values(result), "figures": FIGURES}
+        (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
+    assert [run.name for run in load_runs(folders)] == ["cal (a/cal)", "cal (b/cal)"]
+    assert [run.name for run in load_runs(folders[:1])] == ["cal"]
+    with pytest.raises(ValueError, match="a folder twice"):
+        load_runs([folders[0], folders[0] / ".." / "cal"])
+
+
+def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"no run\.json"):
+        load_run(tmp_path)
+
+
+def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
+    (trial, *_) = suite("quick")
+    old = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), {"jerk": 0.4})
+    line = {"key": trial.key, "result": result_values(old), "figures": {}}
+    (tmp_path / "run.json").write_text(json.dumps(ABOUT))
+    (tmp_path / "results.jsonl").write_text(json.dumps(line) + "\n")
+    with pytest.raises(ValueError, match="older caldrive"):
+        load_run(tmp_path)
+
+
+def test_two_runs_write_the_same_page(runs: list[BenchmarkRun]) -> None:
+    assert report_page(runs) == report_page(runs)
+
+
+def test_a_blind_frame_is_off_by_nothing_that_counts() -> None:
+    seen = trace(predicted_center_distance=[None] * 300 + [0.5] * 300)
+    count, wrong = _error_sums(seen, "center_distance")
+    assert (count.sum(), wrong.sum()) == (300, pytest.approx(150))
+    assert list(np.flatnonzero(count)) == [6, 7, 8, 9, 10, 11]  # from 30 s on, in slots of 5 s
+
+
+def test_what_comes_from_files_is_text_and_no_markup(runs: list[BenchmarkRun]) -> None:
+    evil = replace(runs[0], name="<script>alert(1)</script>")
+    assert "<script>alert" not in report_page([evil])
+
+
+@pytest.fixture(scope="module")
+def page(runs: list[BenchmarkRun], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(report_page(runs))
+    with sync_playwright() as browsers:
+        browser = browsers.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        opened: Any = browser.new_page()
+        opened.asked, opened.complaints = [], []
+        opened.on("request", lambda request: opened.asked.append(request.url))
+        opened.on("pageerror", lambda error: opened.complaints.append(str(error)))
+        opened.goto(path.as_uri())
+        yield opened
+        browser.close()
+
+
+def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
+    runs: list[BenchmarkRun], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page_module, "MOST_STILLS", 1)
+    slow, breaker = runs[1].driven[4], runs[1].driven[9]
+    slow = replace(slow, result=replace(slow.result, infractions=()))
+    for one, width in ((slow, 40), (breaker, 41)):
+        picture = simplejpeg.encode_jpeg(np.full((20, width, 3), width, np.uint8))
+        (runs[1].folder / "stills" / f"{one.trial.key}-0.jpg").write_bytes(picture)
+    html = report_page([replace(runs[1], driven=(slow, breaker))])
+    (shown,) = re.findall(r"data:image/jpeg;base64,([^\"]+)", html)
+    (runs[1].folder / "stills" / f"{breaker.trial.key}-0.jpg").unlink()
+    assert simplejpeg.decode_jpeg(base64.b64decode(shown)).shape == (20, 41, 3)
+
+
+def column(page: Any, table: int, head: str) -> list[str]:
+    found = page.locator("table").nth(table)
+    heads = found.locator("th").all_inner_texts()
+    at = next(i for i, text in enumerate(heads) if text.startswith(head))
+    return [row.locator("td").nth(at).inner_text() for row in found.locator("tbody tr").all()]
+
+
+def test_the_page_opens_with_its_tables_plots_and_stills(page: Any) -> None:
+    heads = page.locator("h2").all_inner_texts()
+    assert {"Runs", "Success", "Infractions", "Driving behaviour", "Speed over distance", "Failures"} <= set(heads)
+    assert page.locator("svg").count() >= 5
+    assert page.locator("article img").count() == 1
+    assert page.evaluate("document.querySelector('article img').naturalWidth") == 40
+
+
+def test_nothing_is_fetched_from_outside(page: Any) -> None:
+    assert [url for url in page.asked if not url.startswith(("file:", "data:"))] == []
+    assert page.complaints == []
+
+
+def test_a_click_on_a_head_sorts_by_number_and_another_turns_it_round(page: Any) -> None:
+    head = page.locator("table").nth(1).locator("th", has_text=re.compile(r"^CAL \(paper\)"))
+    head.click()
+    up = [int(text) for text in column(page, 1, "CAL")]
+    assert up == sorted(up)
+    head.click()
+    assert [int(text) for text in column(page, 1, "CAL")] == sorted(up, reverse=True)
+
+
+def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[BenchmarkRun]) -> None:
+    page.select_option("select[data-filter=run]", "cal")
+    page.select_option("select[data-filter=kind]", "sidewalk")
+    shown = page.locator("article:visible")
+    expected = [
+        one
+        for one in failures(runs[1:])
+        if any(i.kind is InfractionKind.SIDEWALK for i in one.episode.result.infractions)
+    ]
+    assert shown.count() == len(expected) > 0
+    assert page.locator("#shown").inner_text() == str(len(expected))
+    page.select_option("select[data-filter=run]", "")
+    assert shown.count() == 2 * len(expected)

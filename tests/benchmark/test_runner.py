@@ -1,0 +1,271 @@
+"""The runner: broken off anywhere it ends with the results of an unbroken run, and it mixes no two runs."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from caldrive.benchmark import run_folder
+from caldrive.benchmark.evidence import read_trace, trace_path
+from caldrive.benchmark.replay import replay
+from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, as_driven, read_lines, suite_content
+from caldrive.benchmark.runner import benchmark
+from caldrive.benchmark.settings import BenchmarkSettings
+from caldrive.benchmark.suites import suite, to_json
+from caldrive.datatypes import Pose
+from caldrive.files import held
+from caldrive.provenance import code_version
+from tests.benchmark.traces import trace
+
+pytestmark = pytest.mark.usefixtures("fresh_worker")
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> BenchmarkSettings:
+    """Four trials of three seconds, one of them among others."""
+    folder = tmp_path_factory.mktemp("suite")
+    trials = [replace(one, scenario=replace(one.scenario, time_limit=3.0)) for one in suite("quick")[4:8]]
+    (folder / "short.json").write_text(to_json(trials))
+    return BenchmarkSettings(suite=str(folder / "short.json"), agent="oracle", out=folder / "whole", workers=1)
+
+
+@pytest.fixture(scope="module")
+def whole(settings: BenchmarkSettings) -> BenchmarkSettings:
+    assert [step.done for step in benchmark(settings)] == [1, 2, 3, 4]
+    return settings
+
+
+def lines(settings: BenchmarkSettings) -> list[bytes]:
+    return sorted((settings.out / "results.jsonl").read_bytes().splitlines())
+
+
+def test_a_run_broken_off_goes_on_to_the_same_results(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    broken = replace(whole, out=tmp_path)
+    run = benchmark(broken)
+    next(run)
+    run.close()
+    with (tmp_path / "results.jsonl").open("ab") as file:  # as if killed while writing
+        file.write(b'{"key": "tow')
+    assert len(read_lines(tmp_path)) == 1
+    assert [step.done for step in benchmark(broken)] == [2, 3, 4]
+    assert lines(broken) == lines(whole)
+    assert RunFolder(broken.out).driven() == RunFolder(whole.out).driven()
+    assert list(benchmark(broken)) == []
+
+
+def test_two_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    two = replace(whole, out=tmp_path, workers=2)
+    list(benchmark(two))
+    assert lines(two) == lines(whole)
+
+
+@pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
+def test_rays_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    ray = replace(whole, out=tmp_path, workers=2, ray="local")
+    list(benchmark(ray))
+    assert lines(ray) == lines(whole)
+    files = [sorted(path.name for path in (one.out / "traces").iterdir()) for one in (ray, whole)]
+    assert files[0] == files[1]
+
+
+def test_results_stand_in_the_suites_order(whole: BenchmarkSettings) -> None:
+    found = RunFolder(whole.out).driven()
+    assert [one.trial for one in found] == suite(whole.suite)
+    assert all(one.result.duration == pytest.approx(3.0, abs=0.11) for one in found)
+    assert all(one.figures["error/center_distance"] == 0 for one in found)  # the oracle's
+
+
+@pytest.mark.parametrize("change", [{"signs": True}, {"cap": 30.0}, {"controller": "paper"}])
+def test_results_of_another_run_are_not_added_to(whole: BenchmarkSettings, change: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match="give another --out"):
+        next(benchmark(replace(whole, **change)))  # type: ignore[arg-type]
+
+
+def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_folder, "code_version", lambda: "other")
+    with pytest.raises(ValueError, match="with code"):
+        next(benchmark(whole))
+
+
+def test_an_episode_driven_again_goes_as_before(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (trial, *_) = suite(whole.suite)
+    found = replay(whole.out, trial.key, tmp_path / "again.mp4")
+    assert found.same
+    assert found.video.stat().st_size > 1000
+    with pytest.raises(ValueError, match="found no episode 'x'"):
+        replay(whole.out, "x", tmp_path / "other.mp4")
+
+
+def test_results_that_nothing_says_whose_they_are_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").touch()
+    with pytest.raises(ValueError, match=r"no run\.json that says whose"):
+        next(benchmark(replace(whole, out=tmp_path)))
+
+
+def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    with held(tmp_path), pytest.raises(ValueError, match="another benchmark at work"):
+        next(benchmark(replace(whole, out=tmp_path)))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"weather": 99}, "found weather 99"),
+        ({"town": "town09"}, "found town 'town09'"),
+        ({"start": Pose(-900, 0, 0)}, "found no lane"),
+        ({"n_vehicles": 900}, "found 900 cars asked for, but town"),
+        ({"n_pedestrians": 90_000}, "found 90000 people asked for, but town"),
+    ],
+)
+def test_a_trial_that_cannot_be_is_named_before_there_is_a_folder(
+    change: dict[str, Any], said: str, whole: BenchmarkSettings, tmp_path: Path
+) -> None:
+    first, last = suite(whole.suite)[:2]
+    trials = [first, replace(last, scenario=replace(last.scenario, **change))]
+    (tmp_path / "own.json").write_text(to_json(trials))
+    with pytest.raises(ValueError, match=f"{last.key} in .* cannot be driven .{said}"):
+        next(benchmark(replace(whole, suite=str(tmp_path / "own.json"), out=tmp_path / "out")))
+    assert not (tmp_path / "out").exists()
+
+
+def test_results_of_another_episode_of_the_same_name_are_refused(whole: BenchmarkSettings) -> None:
+    (trial, *_) = suite(whole.suite)
+    line = read_lines(whole.out)[trial.key]
+    other = replace(trial, scenario=replace(trial.scenario, seed=9))
+    assert as_driven(trial, line).trial is trial
+    with pytest.raises(ValueError, match="another episode when it was driven"):
+        as_driven(other, line)
+
+
+@pytest.mark.parametrize("change", [{"seed": 3}, {"time_limit": "code"}, {"seed": -1}])
+def test_what_a_suite_does_not_take_claims_no_folder(
+    change: dict[str, Any], whole: BenchmarkSettings, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match="found --seed"):
+        next(benchmark(replace(whole, out=tmp_path, **change)))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "line", ["nonsense", "3", '{"key": "a"}', '{"key": "a", "result": 3, "figures": {}}', '{"key": NaN}'], ids=str
+)
+def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_bytes((whole.out / "run.json").read_bytes())
+    (tmp_path / "results.jsonl").write_text(line + "\n")
+    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
+        next(benchmark(replace(whole, out=tmp_path)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"duration": "abc"}, {"route_length": 0.0}, {"distance": -1.0}, {"comfort": None}, {"outcome": "won"},
+        {"infractions": [{"kind": "flight"}]}, {"scenario": {}},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_results_that_cannot_be_are_named(change: dict[str, Any], whole: BenchmarkSettings, tmp_path: Path) -> None:
+    line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
+    (tmp_path / "results.jsonl").write_text(json.dumps(line | {"result": line["result"] | change}) + "\n")
+    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
+        read_lines(tmp_path)
+
+
+def test_figures_that_are_no_numbers_are_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
+    (tmp_path / "results.jsonl").write_text(json.dumps(line | {"figures": {"off_lane": None}}) + "\n")
+    with pytest.raises(ValueError, match="off_lane is no number"):
+        read_lines(tmp_path)
+
+
+def test_an_episode_that_is_there_twice_is_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").write_bytes((whole.out / "results.jsonl").read_bytes() * 2)
+    with pytest.raises(ValueError, match="is there twice"):
+        read_lines(tmp_path)
+
+
+def test_a_suite_that_has_changed_since_is_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    path = tmp_path / "own.json"
+    town = tmp_path / "town.xodr"
+    town.write_text("first")
+    trials = suite(whole.suite)
+    elsewhere = replace(trials[0], key="x", scenario=replace(trials[0].scenario, town=str(town)))
+    path.write_text(to_json([*trials, elsewhere]))
+    about = RunFolder(whole.out).about | {"suite": str(path), "suite_content": suite_content(path)}
+    (tmp_path / "run.json").write_text(json.dumps(about))
+    assert len(RunFolder(tmp_path).trials) == len(trials) + 1
+    shorter = to_json(trials[:1])
+    for change in (lambda: town.write_text("second"), town.unlink, lambda: path.write_text(shorter), path.unlink):
+        change()
+        with pytest.raises(ValueError, match="is not what was driven"):
+            _ = RunFolder(tmp_path).trials
+
+
+@pytest.mark.parametrize("text", ["[1", "[]", "{}", '{"suite": 3}'])
+def test_a_damaged_description_is_named(text: str, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(ValueError, match=r"run\.json is damaged"):
+        RunFolder(tmp_path)
+
+
+def packed(columns: dict[str, Any]) -> bytes:
+    return gzip.compress(json.dumps({"trace": columns}).encode())
+
+
+SPOILT = [
+    b"garbage", gzip.compress(b"{"), gzip.compress(b'{"trace": 3}'), packed({}), packed(trace() | {"x": [1.0]}),
+    packed(trace(0)), packed(trace(time="noon")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("content", SPOILT, ids=range(len(SPOILT)))
+def test_a_damaged_trace_is_named(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "traces").mkdir()
+    trace_path(tmp_path, "a").write_bytes(content)
+    with pytest.raises(ValueError, match=r"damaged trace .*a\.json\.gz"):
+        read_trace(tmp_path, "a")
+
+
+def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:
+    found = json.loads((whole.out / "run.json").read_text())
+    assert found["agent"] == "oracle"
+    assert found["cap"] == 20.0
+    assert found["code"] == code_version()
+
+
+@pytest.fixture
+def folder(whole: BenchmarkSettings, tmp_path: Path) -> RunFolder:
+    """An empty folder of the same run."""
+    (tmp_path / "run.json").write_bytes((whole.out / "run.json").read_bytes())
+    return RunFolder(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["code", "model", "precision", "agent_source"])
+def test_a_worker_that_drives_with_something_else_is_refused(name: str, folder: RunFolder) -> None:
+    record = EpisodeRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, {name: "other"})
+    with pytest.raises(ValueError, match=f"worker with {name} other.*install the same caldrive and model"):
+        folder.keep(record)
+    assert [path.name for path in folder.path.iterdir()] == ["run.json"]
+
+
+def test_files_are_there_before_their_line(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_folder, "_append", lambda path, line: pytest.fail("was killed before the line"))
+    with pytest.raises(pytest.fail.Exception):
+        folder.keep(EpisodeRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, {}))
+    assert (folder.path / "traces" / "a.json.gz").read_bytes() == b"x"
+    assert folder.lines() == {}
+
+
+def test_results_that_are_kept_may_be_compressed(whole: BenchmarkSettings, folder: RunFolder) -> None:
+    packed_lines = gzip.compress((whole.out / "results.jsonl").read_bytes())
+    (folder.path / "results.jsonl.gz").write_bytes(packed_lines)
+    assert folder.driven() == RunFolder(whole.out).driven()
+    (folder.path / "results.jsonl.gz").write_bytes(packed_lines[:-20])
+    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl\.gz"):
+        folder.lines()

@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from caldrive.benchmark.suites import COLLISIONS, OFFENCES, from_json, suite, to_json
+from caldrive.results import InfractionKind
+
+
+def test_corl2017_has_25_routes_of_each_task_in_each_weather_of_each_condition() -> None:
+    trials = suite("corl2017")
+    assert len(trials) == 1200
+    assert len({one.key for one in trials}) == 1200
+    counts = Counter((one.condition, one.scenario.task) for one in trials)
+    assert len(counts) == 16
+    assert {n for (condition, _), n in counts.items() if "weather" in condition} == {50}
+    assert {n for (condition, _), n in counts.items() if "weather" not in condition} == {100}
+    weathers = {(one.scenario.town, one.scenario.weather) for one in trials if one.condition == "new town + weather"}
+    assert weathers == {("town02", 4), ("town02", 14)}
+
+
+def test_no_episode_is_another_one_under_another_sky() -> None:
+    for name, count in (("corl2017", 1200), ("nocrash", 900)):
+        both = [replace(one.scenario, weather=1, task="") for seed in (0, 1) for one in suite(name, seed)]
+        assert len(set(both)) == 2 * count
+
+
+def test_nocrash_shares_its_empty_and_regular_towns_with_the_papers_navigation() -> None:
+    known = {replace(one.scenario, task="") for one in suite("corl2017")}
+    shared = Counter(one.scenario.task for one in suite("nocrash") if replace(one.scenario, task="") in known)
+    assert shared == {"empty": 300, "regular": 300}
+
+
+def test_its_first_third_has_seen_every_cell() -> None:
+    assert len({(one.condition, one.scenario.task) for one in suite("corl2017")[:400]}) == 16
+
+
+def test_corl2017_once_has_each_of_its_routes_in_one_weather_and_all_cells_from_the_start() -> None:
+    trials, whole = suite("corl2017-once"), suite("corl2017")
+    assert {one.key for one in trials} <= {one.key for one in whole}
+    routes = Counter((one.condition, one.scenario.task, one.key[-2:]) for one in trials)
+    assert len(routes) == 400
+    assert set(routes.values()) == {1}
+    assert len({(one.condition, one.scenario.task) for one in trials[:16]}) == 16
+    weathers = Counter(one.scenario.weather for one in trials if one.condition == "new town")
+    assert set(weathers) == {1, 3, 6, 8}
+    assert set(weathers.values()) <= {24, 28}
+
+
+def test_only_the_dynamic_task_has_others_on_the_road() -> None:
+    traffic = {
+        (one.scenario.town, one.scenario.task): (one.scenario.n_vehicles, one.scenario.n_pedestrians)
+        for one in suite("corl2017")
+    }
+    assert traffic["town01", "navigation-dynamic"] == (20, 50)
+    assert traffic["town02", "navigation-dynamic"] == (15, 50)
+    assert {n for (_, task), n in traffic.items() if task != "navigation-dynamic"} == {(0, 0)}
+
+
+@pytest.mark.parametrize(("name", "fatal"), [("nocrash", COLLISIONS), ("traffic-school", OFFENCES)])
+def test_nocrash_ends_at_collisions_and_traffic_school_at_every_offence(
+    name: str, fatal: tuple[InfractionKind, ...]
+) -> None:
+    trials = suite(name)
+    assert {one.fatal for one in trials} == {fatal}
+    dense = {(s.town, s.n_vehicles, s.n_pedestrians) for s in (one.scenario for one in trials) if s.task == "dense"}
+    assert dense == {("town01", 100, 250), ("town02", 70, 150)}
+
+
+def test_the_authors_time_limit_is_longer() -> None:
+    short, long = (suite("quick", time_limit=name)[0].scenario.time_limit for name in ("paper", "code"))
+    assert long == pytest.approx(2 * short + 10)
+
+
+def test_a_suite_of_ones_own_is_read_from_a_file(tmp_path: Path) -> None:
+    mine, path = suite("quick", seed=3)[3:7], tmp_path / "mine.json"
+    path.write_text(to_json(mine))
+    assert suite(str(path)) == mine
+
+
+def test_files_that_are_no_suites_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "suite.json"
+    with pytest.raises(ValueError, match=r"no suite .*suite\.json"):
+        from_json(path)
+    for content in ("", "{}", "[]", '[{"key": "a"}]', to_json(suite("quick")[:1] * 2), '[{"key": 1, "fatal": ["x"]}]'):
+        path.write_text(content)
+        with pytest.raises(ValueError, match=r"suite\.json"):
+            from_json(path)
+    with pytest.raises(ValueError, match="type --suite quick"):
+        suite("corl")
+
+
+@pytest.mark.parametrize("key", ["../../precious", "/tmp/a", "", ".", "a/b", "a" * 101, "a\0"])
+def test_a_key_that_could_not_name_a_file_is_refused(key: str, tmp_path: Path) -> None:
+    rows = json.loads(to_json(suite("quick")[:1]))
+    (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"key": key}]))
+    with pytest.raises(ValueError, match=r"found key .*wanted letters"):
+        suite(str(tmp_path / "own.json"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_vehicles": -5},
+        {"n_vehicles": "many"},
+        {"weather": 1.5},
+        {"time_limit": 0},
+        {"start": [1, 2, 3]},
+        {"cars": 3},
+    ],
+    ids=str,
+)
+def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], tmp_path: Path) -> None:
+    rows = json.loads(to_json(suite("quick")[:1]))
+    (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"scenario": rows[0]["scenario"] | change}]))
+    with pytest.raises(ValueError, match=r"own\.json is no suite"):
+        suite(str(tmp_path / "own.json"))

@@ -1,0 +1,169 @@
+"""A recording can be broken off at any moment, and ends like an unbroken one."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from caldrive.collection import collect as collection
+from caldrive.collection.collect import _record, collect
+from caldrive.collection.config import CollectConfig
+from caldrive.datatypes import Control
+from caldrive.world.embedded import EmbeddedWorld
+
+TINY = CollectConfig(
+    "town02",
+    (1, 6),
+    episodes=3,
+    duration=2.0,
+    cars=6,
+    people=10,
+    tailgating=0.4,
+    width=48,
+    height=24,
+    semantic=True,
+    seed=4,
+)
+
+
+@pytest.fixture(autouse=True)
+def _fresh() -> Iterator[None]:
+    """Each test begins like a new process and leaves nothing running."""
+    collection._let_go()
+    yield
+    collection._let_go()
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unbroken")
+    assert [k for k, _ in collect(TINY, folder)] == [0, 1, 2]
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
+
+
+def test_a_recording_broken_off_between_episodes_ends_like_an_unbroken_one(unbroken: Path, tmp_path: Path) -> None:
+    recording = collect(TINY, tmp_path)
+    next(recording)
+    recording.close()  # type: ignore[attr-defined]
+    first = contents(tmp_path)
+    assert list(first) == ["episode-00000.parquet"]
+    collection._let_go()
+    assert [k for k, _ in collect(TINY, tmp_path)] == [1, 2]
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_recording_killed_within_an_episode_leaves_no_half_file(
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps, go_on = [], EmbeddedWorld.step
+
+    def break_off(world: EmbeddedWorld, control: Control) -> object:
+        steps.append(control)
+        if len(steps) == 30:
+            raise KeyboardInterrupt
+        return go_on(world, control)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(EmbeddedWorld, "step", break_off)
+        with pytest.raises(KeyboardInterrupt):
+            list(collect(TINY, tmp_path))
+    assert list(contents(tmp_path)) == ["episode-00000.parquet"]
+    assert [k for k, _ in collect(TINY, tmp_path)] == [1, 2]
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_finished_recording_has_nothing_left_to_do(unbroken: Path) -> None:
+    before = contents(unbroken)
+    assert list(collect(TINY, unbroken)) == []
+    assert contents(unbroken) == before
+
+
+def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Path) -> None:
+    before = contents(unbroken)
+    with pytest.raises(ValueError, match="a recording with seed 4, wanted 5"):
+        next(collect(replace(TINY, seed=5, episodes=4), unbroken))
+    assert contents(unbroken) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"town": "town09"}, "found town 'town09'"),
+        ({"weathers": (1, 15)}, "found weather 15"),
+        ({"weathers": ()}, "no weather"),
+        ({"width": 0}, "found --width 0"),
+        ({"duration": math.nan}, "found --duration nan"),
+        ({"episodes": 0}, "found --episodes 0"),
+        ({"seed": -1}, "found --seed -1"),
+        ({"cars": 400}, "found --cars 400"),
+        ({"people": 40_000}, "found --people 40000"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_before_anything_is_written(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(ValueError, match=said):
+        next(collect(replace(TINY, **change), tmp_path / "new"))
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_recording_is_not_continued_with_other_code(unbroken: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(collection, "code_version", lambda: "another")
+    with pytest.raises(ValueError, match="wanted another: give another --out"):
+        next(collect(replace(TINY, episodes=4), unbroken))
+
+
+def test_fewer_episodes_than_before_are_no_smaller_recording(unbroken: Path) -> None:
+    before = contents(unbroken)
+    assert not list(collect(replace(TINY, episodes=1), unbroken))
+    assert contents(unbroken) == before
+
+
+def test_a_folder_without_episodes_takes_other_settings(unbroken: Path, tmp_path: Path) -> None:
+    collection._claim(tmp_path, replace(TINY, cars=7))
+    recording = collect(TINY, tmp_path)
+    next(recording)
+    recording.close()  # type: ignore[attr-defined]
+    assert contents(tmp_path).items() <= contents(unbroken).items()
+    assert (tmp_path / "manifest.json").read_bytes() == (unbroken / "manifest.json").read_bytes()
+
+
+@pytest.mark.parametrize("manifest", ["", "[1]", '{"town"'])
+def test_a_damaged_manifest_is_named(tmp_path: Path, manifest: str) -> None:
+    (tmp_path / "manifest.json").write_text(manifest)
+    (tmp_path / "episode-00000.parquet").write_bytes(b"")
+    with pytest.raises(ValueError, match=r"manifest\.json is damaged"):
+        next(collect(TINY, tmp_path))
+
+
+def test_episodes_of_unknown_origin_are_not_added_to(tmp_path: Path) -> None:
+    (tmp_path / "episode-00000.parquet").write_bytes(b"")
+    with pytest.raises(ValueError, match="says how they came"):
+        next(collect(TINY, tmp_path))
+
+
+def _dies_once(config: CollectConfig, folder: Path, number: int) -> int:
+    mark = folder / "died"
+    if number == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return _record(config, folder, number)
+
+
+def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(collection, "_record", _dies_once)
+    list(collect(TINY, tmp_path, workers=2))
+    assert contents(tmp_path) == contents(unbroken)

@@ -1,0 +1,266 @@
+"""Every command, end to end and small."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from PIL import Image as Picture
+from rich.table import Table
+from rich.text import Text
+
+import caldrive
+from caldrive.agents.settings import AgentSettings
+from caldrive.cli import _print, main
+from caldrive.commands.answer import Answer
+from caldrive.datatypes import Command, Observation
+from caldrive.driving.determinism import Digests, compare
+from caldrive.driving.speed import Stopwatch
+from caldrive.perception.network.config import BlockConfig, PerceptionConfig
+from caldrive.perception.training.config import TRAININGS, TrainingConfig
+from caldrive.visualization.hud import SIZE
+
+DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]
+PREDICTED = ("hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance")
+
+
+def run_json(*arguments: str) -> dict[str, Any]:
+    """What a successful command prints with --json, which must be all that it prints."""
+    said = io.StringIO()
+    with redirect_stdout(said):
+        assert main([*arguments, "--json"]) == 0
+    found: dict[str, Any] = json.loads(said.getvalue())
+    return found
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A network that has learnt nothing."""
+    import torch
+
+    from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
+    from caldrive.perception.network.network import Network
+
+    torch.manual_seed(0)
+    config = PerceptionConfig(64, 32, 0.0625, vehicle_distance=BlockConfig("gru", 8, 0.0, length=3))
+    path = tmp_path_factory.mktemp("model") / "random.safetensors"
+    save_network(path, Network(config), CheckpointInfo(config))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """Two seconds of each of two routes by the oracle: what is printed, and the folder."""
+    out = tmp_path_factory.mktemp("drive") / "results"
+    return run_json(*DRIVE, "--agent", "oracle", "--seconds", "2", "--episodes", "2", "--out", str(out)), out
+
+
+def test_drive_reports_each_episode(driven: tuple[dict[str, Any], Path]) -> None:
+    found, out = driven
+    assert [one["file"] for one in found["episodes"]] == [str(out / f"episode-00{k}.json") for k in range(2)]
+    for one in found["episodes"]:
+        assert one["outcome"] == "timeout"
+        assert one["duration"] == pytest.approx(2.0)
+        assert 0 < one["distance"] < 15
+        assert one["infractions"] == []
+    assert found["episodes"][0]["scenario"]["goal"] != found["episodes"][1]["scenario"]["goal"]
+
+
+def test_drive_writes_a_trace_of_every_step(driven: tuple[dict[str, Any], Path]) -> None:
+    found, out = driven
+    kept = json.loads((out / "episode-000.json").read_text())
+    trace = kept["trace"]
+    assert kept["result"] == {k: v for k, v in found["episodes"][0].items() if k != "file"}
+    assert trace["time"] == pytest.approx([0.1 * i for i in range(21)])
+    assert {len(column) for column in trace.values()} == {21}
+    assert [trace["x"][0], trace["y"][0]] == pytest.approx(
+        [kept["result"]["scenario"]["start"][k] for k in "xy"], abs=0.01
+    )
+    assert all(trace[f"predicted_{name}"] == trace[f"true_{name}"] for name in PREDICTED)
+
+
+def test_drive_films_all_episodes_in_one_video(driven: tuple[dict[str, Any], Path]) -> None:
+    found, out = driven
+    assert found["video"] == str(out / "drive.mp4")
+    with av.open(found["video"]) as film:
+        shapes = [(frame.width, frame.height) for frame in film.decode(video=0)]
+        assert film.streams.video[0].average_rate == 10
+    assert shapes == [SIZE] * (2 * (21 + 15))
+    assert sorted(p.name for p in out.iterdir()) == [
+        *("drive.mp4", "episode-000.json", "episode-000.png", "episode-001.json", "episode-001.png")
+    ]
+
+
+def test_a_table_in_a_file_keeps_all_its_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    figures = [f"{k}0/100  {k}0 % (80-100)  paper 64" for k in range(5)]
+    table = Table()
+    table.add_row(*(Text(one, no_wrap=True) for one in figures))
+    _print(Answer({}, table), as_json=False)
+    shown = capsys.readouterr().out
+    assert all(one in shown for one in figures)
+
+
+def test_strict_ends_with_1_where_a_goal_was_not_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [*DRIVE, "--agent", "oracle", "--seconds", "0.5", "--no-video", "--out", str(tmp_path), "--strict"]
+    assert main(arguments) == 1
+    shown = capsys.readouterr().out
+    assert "0 of 1 reached the goal" in shown
+    assert str(tmp_path) in shown
+    assert not (tmp_path / "drive.mp4").exists()
+
+
+def test_cal_drives_from_the_image_and_its_trace_tells_seen_from_true(model: str, tmp_path: Path) -> None:
+    run_json(*DRIVE, "--model", model, "--seconds", "0.5", "--no-video", "--out", str(tmp_path))
+    trace = json.loads((tmp_path / "episode-000.json").read_text())["trace"]
+    assert len(trace["time"]) == 6
+    assert trace["predicted_vehicle_distance"] != trace["true_vehicle_distance"]
+
+
+def test_an_image_that_tells_nothing_brakes_to_a_stand_and_says_why(model: str) -> None:
+    from caldrive.agents.registry import agent_entry, make_cal
+
+    settings = AgentSettings(model=Path(model))
+    agent, camera = make_cal(settings, 0.1), agent_entry("cal").camera(settings)
+    assert camera is not None
+    agent.reset()
+    black = np.zeros((camera.height, camera.width, 3), np.uint8)
+    for speed in (8.0, 3.0, 0.0):
+        control = agent.act(Observation(0.0, black, speed, Command.STRAIGHT))
+        assert control.throttle == 0.0
+        assert control.brake >= 0.3
+        assert agent.decision is not None
+        assert "black" in agent.decision.note
+    agent.act(Observation(0.0, black + 90, 0.0, Command.STRAIGHT))
+    assert agent.decision.note == ""
+
+
+def test_speed_world_says_where_the_time_goes() -> None:
+    found = run_json("speed", "world", "--town", "town02", "--cars", "3", "--people", "5", "--steps", "10")
+    assert {"camera", "traffic (SUMO)", "pedestrians", "lights", "labels and truth", "rest"} <= found["parts_ms"].keys()
+    assert found["steps_per_second"] > 0
+    assert found["first_frame"] > 0
+
+
+def test_what_no_part_takes_is_the_rest() -> None:
+    watch = Stopwatch()
+    for _ in range(3):
+        for _ in range(2):
+            with watch.part("work"):
+                pass
+        watch.lap(1.0)
+    assert [lap.keys() for lap in watch.laps] == [{"work", "rest"}] * 3
+    assert all(sum(lap.values()) == pytest.approx(1.0) and 0 < lap["work"] < 1.0 for lap in watch.laps)
+
+
+def test_speed_agent_gives_median_and_99th_percentile(model: str) -> None:
+    found = run_json("speed", "agent", "--model", model, "--steps", "20")
+    assert 0 < found["median_ms"] <= found["p99_ms"]
+    assert (found["width"], found["height"]) == (64, 32)
+
+
+def test_two_fresh_processes_drive_the_same_bytes() -> None:
+    found = run_json("determinism", "--agent", "oracle", "--town", "town02", "--seconds", "1")
+    assert found["equal"]
+    assert found["steps"] == 11
+
+
+def test_a_comparison_names_the_first_step_and_part_that_differ() -> None:
+    steps = tuple(("image", "truth", "decision", f"control{i}") for i in range(5))
+    other = (*steps[:3], ("image", "truth", "decision", "another"), steps[4])
+    assert compare(Digests(steps, "r"), Digests(steps, "r")).equal
+    assert compare(Digests(steps, "r"), Digests(other, "r")).difference == "step 3 (0.3 s) differs in its control"
+    assert (
+        compare(Digests(steps, "r"), Digests(steps[:4], "r")).difference
+        == "one run ends after 4 steps, the other goes on"
+    )
+    assert compare(Digests(steps, "r"), Digests(steps, "q")).difference == "the results differ, though no step does"
+
+
+def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    different = compare(Digests((("a",) * 4,), "r"), Digests((("b",) * 4,), "r"))
+    monkeypatch.setattr("caldrive.driving.determinism.check_determinism", lambda *_: different)
+    assert main(["determinism"]) == 1
+    assert "step 0 (0.0 s) differs in its image" in capsys.readouterr().out
+
+
+def test_town_writes_its_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def sheet(town: str, randomised: int) -> np.ndarray[Any, Any]:
+        return np.full((40, 80, 3), len(town) + randomised, np.uint8)
+
+    monkeypatch.setattr("caldrive.visualization.contact_sheet.contact_sheet", sheet)
+    found = run_json("town", "--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
+    assert (found["width"], found["height"]) == (160, 80)
+    assert Picture.open(found["sheet"]).size == (160, 80)
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["town.png"]
+
+
+def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom caldrive.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
+        "print('loaded', *{'torch', 'libsumo', 'moderngl', 'numpy', 'av'} & sys.modules.keys())"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert all(verb in shown for verb in ("drive", "town", "speed", "determinism"))
+    assert shown.splitlines()[-1].strip() == "loaded"
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(getattr(caldrive, name) is not None for name in caldrive.__all__)
+    with pytest.raises(AttributeError, match="caldrive has no 'Car'"):
+        caldrive.Car  # noqa: B018
+
+
+def test_what_is_collected_can_be_trained_on_and_the_result_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = TrainingConfig(steps=2, batch=2, window=3, block_steps=3, block_batch=8, save_every=1)
+    monkeypatch.setitem(TRAININGS, "small", small)
+    recording, training = tmp_path / "recording", tmp_path / "training"
+    found = run_json(
+        *("collect", "--out", str(recording), "--episodes", "2", "--duration", "1", "--workers", "1"),
+    )
+    assert sum(found["counts"]["hazard_stop"].values()) == 2 * 10 * 3  # episodes, moments, cameras
+    model = run_json("train", "--data", str(recording), "--out", str(training))["model"]
+    seen = run_json("evaluate", "--data", str(recording), "--model", model, "--held-out")
+    assert 0 < seen["frames"] <= 10 * 3  # one of the two episodes
+    assert 0 <= seen["overall"]["red_light/iou"] <= 1
+    checked = run_json("data", str(recording), "--picture", str(tmp_path / "labels.png"))
+    assert (checked["episodes"], checked["damaged"]) == (2, [])
+    driven = run_json(*DRIVE, "--model", model, "--seconds", "1", "--no-video", "--out", str(tmp_path / "drive"))
+    assert driven["episodes"][0]["duration"] == pytest.approx(1.0)
+
+
+def test_a_training_says_which_blocks_begin_anew(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from caldrive.commands.train import Train
+    from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
+    from caldrive.perception.network.network import Network
+
+    usual = PerceptionConfig()
+    other = replace(usual, hazard_stop=replace(usual.hazard_stop, dilation=5))
+    save_network(tmp_path / "other.safetensors", Network(other), CheckpointInfo(other))
+    assert Train(initial=tmp_path / "other.safetensors", out=tmp_path)._began_anew() == ["hazard_stop"]
+    (tmp_path / "state.safetensors").touch()
+    assert Train(initial=tmp_path / "gone.safetensors", out=tmp_path)._began_anew() == []
+
+
+def test_imagenets_weights_are_asked_for_by_a_training_that_begins_and_not_by_one_that_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TORCH_HOME", str(tmp_path / "hub"))
+    train = ["train", "--preset", "paper", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "out")]
+    assert main(train) == 2
+    assert "found no vgg16-*.pth" in capsys.readouterr().err
+    (tmp_path / "out").mkdir(exist_ok=True)
+    (tmp_path / "out" / "state.safetensors").touch()
+    assert main(train) == 2
+    assert "there is no episode" in capsys.readouterr().err

@@ -1,0 +1,133 @@
+"""The four tasks: fixed routes that fit their task's definition, and the scenarios made of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from caldrive.datatypes import Command
+from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, draw_routes, routes, scenarios
+from caldrive.geometry import wrap_angle
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.route import Route, plan_route
+from caldrive.world.roads.towns import TOWNS, load_roads
+
+LENGTHS = {  # shortest and longest route in m
+    ("town01", "straight"): (90, 300), ("town01", "one-turn"): (130, 420), ("town01", "navigation"): (400, 1000),
+    ("town02", "straight"): (45, 175), ("town02", "one-turn"): (65, 240), ("town02", "navigation"): (200, 600),
+}  # fmt: skip
+
+
+def planned(town: str, task: str) -> list[Route]:
+    return [plan_route(load_roads(town), start, goal) for start, goal in routes(town, task)]
+
+
+def turns(route: Route) -> list[Command]:
+    return [turn.command for turn in route.turns if turn.command is not Command.STRAIGHT]
+
+
+@pytest.mark.parametrize("town", TOWNS)
+@pytest.mark.parametrize("task", TASKS)
+def test_a_task_has_25_different_routes(town: str, task: str) -> None:
+    assert len(set(routes(town, task))) == ROUTES_PER_TASK == 25
+
+
+@pytest.mark.parametrize("town", TOWNS)
+def test_straight_routes_neither_turn_nor_bend(town: str) -> None:
+    for route in planned(town, "straight"):
+        assert turns(route) == []
+        assert abs(wrap_angle(route.line.heading_at(0) - route.line.heading_at(route.length))) < 0.2
+
+
+@pytest.mark.parametrize("town", TOWNS)
+def test_one_turn_routes_turn_once_and_to_both_sides(town: str) -> None:
+    found = [turns(route) for route in planned(town, "one-turn")]
+    assert {len(commands) for commands in found} == {1}
+    assert {commands[0] for commands in found} == {Command.LEFT, Command.RIGHT}
+
+
+@pytest.mark.parametrize("town", TOWNS)
+def test_navigation_routes_turn_twice_or_more(town: str) -> None:
+    assert min(len(turns(route)) for route in planned(town, "navigation")) >= 2
+
+
+@pytest.mark.parametrize(("town", "task"), LENGTHS)
+def test_routes_are_as_long_as_their_task_asks(town: str, task: str) -> None:
+    low, high = LENGTHS[town, task]
+    assert all(low <= route.length <= high for route in planned(town, task))
+
+
+@pytest.mark.parametrize("town", TOWNS)
+def test_the_dynamic_task_has_the_routes_of_navigation(town: str) -> None:
+    assert routes(town, "navigation-dynamic") == routes(town, "navigation")
+
+
+@pytest.mark.parametrize("town", TOWNS)
+@pytest.mark.parametrize("task", TASKS)
+def test_nobody_starts_right_before_a_stop_line(town: str, task: str) -> None:
+    roads = load_roads(town)
+    for start, _ in routes(town, task):
+        lane, s = roads.lane_at(start)
+        assert lane.line.length - s > 24
+
+
+def test_the_routes_do_not_depend_on_the_seed() -> None:
+    assert routes("town01", "straight", seed=1) == routes("town01", "straight", seed=2)
+
+
+@pytest.mark.parametrize(("town", "others"), [("town01", (20, 50)), ("town02", (15, 50))])
+def test_only_the_dynamic_task_has_others_on_the_road(town: str, others: tuple[int, int]) -> None:
+    for task in TASKS:
+        wanted = others if task == "navigation-dynamic" else (0, 0)
+        assert {(one.n_vehicles, one.n_pedestrians) for one in scenarios(town, task)} == {wanted}
+
+
+def test_others_can_be_asked_for_and_left_out() -> None:
+    assert {(one.n_vehicles, one.n_pedestrians) for one in scenarios("town02", "straight", cars=70, people=150)} == {
+        (70, 150)
+    }
+    assert {one.n_vehicles for one in scenarios("town02", "navigation-dynamic", cars=0)} == {0}
+
+
+def test_scenarios_carry_task_weather_and_their_own_seed() -> None:
+    found = scenarios("town02", "one-turn", 14, seed=3)
+    assert {(one.town, one.task, one.weather) for one in found} == {("town02", "one-turn", 14)}
+    assert len({one.seed for one in found}) == 25
+    assert {one.seed for one in found}.isdisjoint(one.seed for one in scenarios("town02", "one-turn", 14, seed=4))
+
+
+def test_the_time_limit_is_that_of_the_paper_or_that_of_its_code() -> None:
+    lengths = [route.length for route in planned("town02", "straight")]
+    paper, code = (scenarios("town02", "straight", time_limit=limit) for limit in ("paper", "code"))
+    assert [one.time_limit for one in paper] == pytest.approx([length * 0.36 for length in lengths])
+    assert [one.time_limit for one in code] == pytest.approx([length * 0.72 + 10 for length in lengths])
+
+
+def test_an_unknown_task_names_the_known_ones() -> None:
+    with pytest.raises(ValueError, match="found task 'parking', wanted one of straight, one-turn, navigation"):
+        scenarios("town01", "parking")
+
+
+def test_an_unknown_time_limit_is_refused() -> None:
+    with pytest.raises(ValueError, match="found time limit 'none', wanted paper or code"):
+        scenarios("town02", "straight", time_limit="none")
+
+
+@pytest.mark.parametrize("task", ["straight", "one-turn", "navigation"])
+def test_routes_drawn_anew_fit_their_task_and_follow_the_seed(task: str, town02: RoadNetwork) -> None:
+    first, again, other = (draw_routes(town02, task, 5, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert first == again != other
+    counts = [len(turns(plan_route(town02, *pair))) for pair in first]
+    low, high = {"straight": (0, 0), "one-turn": (1, 1), "navigation": (2, math.inf)}[task]
+    assert all(low <= count <= high for count in counts)
+
+
+def test_a_map_too_small_for_a_task_says_so(town02: RoadNetwork) -> None:
+    from dataclasses import replace
+
+    (lane,) = [one for one in town02.driveable if one.line.length > 60][:1]
+    small = replace(town02, lanes={lane.id: replace(lane, successors=())})
+    with pytest.raises(ValueError, match="found 0 routes for navigation in town02, wanted 3: the map is too small"):
+        draw_routes(small, "navigation", 3, np.random.default_rng(0))

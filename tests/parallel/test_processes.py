@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import pytest
+
+from caldrive.parallel.processes import spread
+
+
+def _square(k: int) -> int:
+    return k * k
+
+
+def _dies_at_first(folder: Path, k: int) -> int:
+    mark = folder / f"died-{k}"
+    if k % 3 == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return k * k
+
+
+def _dies(k: int) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return k
+
+
+def _fails(k: int) -> int:
+    raise ValueError(f"found {k}")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_all_work_is_done_once(workers: int) -> None:
+    assert sorted(spread(_square, range(7), workers)) == [(k, k * k) for k in range(7)]
+
+
+def test_the_work_of_workers_that_die_is_done_again(tmp_path: Path) -> None:
+    assert sorted(spread(partial(_dies_at_first, tmp_path), range(6), 2)) == [(k, k * k) for k in range(6)]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_workers_that_always_die_are_given_up() -> None:
+    with pytest.raises(RuntimeError, match="type --workers 1"):
+        list(spread(_dies, range(3), 2))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_error_in_the_work_ends_it(workers: int) -> None:
+    with pytest.raises(ValueError, match="found 0"):
+        list(spread(_fails, [0], workers))
+
+
+def _marks(folder: Path, k: int) -> int:
+    (folder / f"{k}").touch()
+    time.sleep(0.05)
+    return k
+
+
+def test_what_nobody_waits_for_any_more_is_not_done(tmp_path: Path) -> None:
+    work = spread(partial(_marks, tmp_path), range(100), 2)
+    next(work)
+    work.close()  # type: ignore[attr-defined]
+    assert 1 <= len(list(tmp_path.iterdir())) < 20
+
+
+def _sleeps(folder: Path, k: int) -> int:
+    (folder / f"{os.getpid()}").touch()
+    time.sleep(60)
+    return k
+
+
+def _lives(pid: int) -> bool:
+    try:
+        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def sleepers(tmp_path: Path) -> Iterator[tuple[BaseProcess, list[int]]]:
+    """A process whose two workers sleep, and their numbers."""
+    parent = get_context("spawn").Process(target=_spread_sleepers, args=(tmp_path,))
+    parent.start()
+    _within_seconds(lambda: len(list(tmp_path.iterdir())) == 2)
+    workers = [int(path.name) for path in tmp_path.iterdir()]
+    assert len(workers) == 2
+    assert all(map(_lives, workers))
+    yield parent, workers
+    parent.kill()
+    parent.join()
+
+
+def _within_seconds(true: Callable[[], bool]) -> bool:
+    until = time.monotonic() + 60
+    while not true() and time.monotonic() < until:
+        time.sleep(0.05)
+    return true()
+
+
+def test_workers_end_with_the_process_that_they_work_for(sleepers: tuple[BaseProcess, list[int]]) -> None:
+    parent, workers = sleepers
+    parent.kill()
+    parent.join()
+    assert _within_seconds(lambda: not any(map(_lives, workers)))
+
+
+def test_ctrl_c_ends_workers_without_a_word(
+    sleepers: tuple[BaseProcess, list[int]], capfd: pytest.CaptureFixture[str]
+) -> None:
+    for worker in sleepers[1]:
+        os.kill(worker, signal.SIGINT)
+    assert _within_seconds(lambda: not any(map(_lives, sleepers[1])))
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def _spread_sleepers(folder: Path) -> None:
+    list(spread(partial(_sleeps, folder), range(2), 2))

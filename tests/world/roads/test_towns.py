@@ -1,0 +1,90 @@
+"""Towns by name or file: what cannot be loaded says in one sentence what to type; maps are converted once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from caldrive.geometry import to_local
+from caldrive.world.roads import netconvert
+from caldrive.world.roads.netconvert import convert_opendrive
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.towns import load_roads
+from tests.maps import sign_at, write_map
+
+needs_netconvert = pytest.mark.skipif(
+    not pytest.importorskip("importlib.util").find_spec("sumo"), reason="netconvert comes with the extra opendrive"
+)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache for converted maps."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "caldrive"
+
+
+def test_a_town_is_loaded_once(town01: RoadNetwork) -> None:
+    assert load_roads("town01") is town01
+    assert town01.name == town01.style == "town01"
+
+
+def test_an_unknown_town_names_the_known_ones() -> None:
+    with pytest.raises(ValueError, match=r"found town 'Paris', wanted one of town01, town02 or an OpenDRIVE file"):
+        load_roads("Paris")
+
+
+def test_a_missing_map_names_the_file(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"found no file .*lost\.xodr, wanted an OpenDRIVE map"):
+        load_roads(str(tmp_path / "lost.xodr"))
+
+
+def test_a_broken_map_says_so_and_leaves_nothing_in_the_cache(cache: Path, tmp_path: Path) -> None:
+    (tmp_path / "broken.xodr").write_text("<OpenDRIVE><road>")
+    with pytest.raises(ValueError, match="no readable OpenDRIVE map"):
+        load_roads(str(tmp_path / "broken.xodr"))
+    assert not list(cache.glob("*.xml"))
+
+
+@needs_netconvert
+def test_a_map_without_roads_gives_no_network(tmp_path: Path) -> None:
+    (tmp_path / "empty.xodr").write_text("<OpenDRIVE/>")
+    with pytest.raises(ValueError, match=r"empty\.xodr is no OpenDRIVE map that netconvert can read"):
+        convert_opendrive(tmp_path / "empty.xodr", tmp_path / "empty.net.xml")
+    assert [path.name for path in tmp_path.iterdir()] == ["empty.xodr"]
+
+
+@needs_netconvert
+def test_a_straight_road_becomes_a_town_with_two_lanes_and_its_sign(cache: Path, tmp_path: Path) -> None:
+    roads = load_roads(str(write_map(tmp_path, signals=sign_at(30))))
+    assert roads.name == "road"
+    assert len(roads.driveable) == 2
+    (sign,) = roads.signs
+    assert (sign.pose.x, sign.pose.y, sign.limit) == pytest.approx((30, -5, 60), abs=0.05)
+    lane, s = roads.lane_at(sign.pose.__class__(30, -2, 0))
+    assert s == pytest.approx(30, abs=0.1)
+    assert to_local(lane.line.pose_at(s), lane.line.points)[:, 1] == pytest.approx(0, abs=0.01)
+
+
+@needs_netconvert
+def test_a_map_is_converted_once(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_map(tmp_path)
+    first = load_roads(str(path))
+    assert [one.name for one in cache.iterdir()] == [first.network.name]
+    load_roads.cache_clear()
+    monkeypatch.setattr(netconvert, "convert_opendrive", lambda *_: pytest.fail("was converted again"))
+    assert load_roads(str(path)).network == first.network
+
+
+@needs_netconvert
+def test_a_cache_that_cannot_be_written_is_no_obstacle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert len(load_roads(str(write_map(tmp_path))).driveable) == 2
+
+
+def test_without_netconvert_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "sumo", None)
+    with pytest.raises(RuntimeError, match=r"pip install 'caldrive\[opendrive\]'"):
+        netconvert.netconvert_binary()

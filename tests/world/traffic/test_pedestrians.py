@@ -1,0 +1,209 @@
+"""People: where they walk, when they step onto the road, and that equal seeds give equal walks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from caldrive.datatypes import PedestrianState, Pose, VehicleState
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.traffic.pedestrians import Pedestrians, find_walks, may_walk
+
+DT = 0.1
+FAR = VehicleState(Pose(-1e4, 0, 0), 0.0, 4.2, 1.8, "ego")  # a car where it disturbs nobody
+Walk = list[tuple[PedestrianState, ...]]
+
+
+def walk(people: Pedestrians, seconds: float, cars: list[VehicleState] | None = None) -> Walk:
+    found = []
+    for _ in range(round(seconds / DT)):
+        people.step(DT, cars or [FAR])
+        found.append(people.states())
+    return found
+
+
+def people(roads: RoadNetwork, n: int, seed: int = 0, crossing: float = 1.0) -> Pedestrians:
+    return Pedestrians(roads, n, np.random.default_rng(seed), crossing)
+
+
+def places(moments: Walk) -> np.ndarray:
+    return np.array([[(p.pose.x, p.pose.y) for p in moment] for moment in moments])
+
+
+def crossings(moments: Walk) -> int:
+    """How often somebody stepped onto the road."""
+    on_road = np.array([[p.on_road for p in moment] for moment in moments], dtype=int)
+    return int((np.diff(on_road, axis=0) > 0).sum())
+
+
+@pytest.fixture(scope="module")
+def busy(town02: RoadNetwork) -> Walk:
+    """A minute of 60 people who cross often."""
+    return walk(people(town02, 60, crossing=5.0), 60)
+
+
+def test_whoever_is_on_the_roadway_is_known_to_be(busy: Walk, town02: RoadNetwork) -> None:
+    at = shapely.points(places(busy[::5]).reshape(-1, 2))
+    on_road = np.array([p.on_road for moment in busy[::5] for p in moment])
+    assert not shapely.covers(town02.roadway.buffer(-0.05), at[~on_road]).any()
+    away = shapely.distance(town02.roadway, at[on_road])
+    assert away.max() < 1.3
+    assert (away > 0.5).mean() < 0.03
+
+
+def test_people_leave_neither_sidewalk_nor_road(busy: Walk, town02: RoadNetwork) -> None:
+    town = town02.roadway.union(town02.sidewalk).buffer(0.1)
+    assert shapely.contains_xy(town, places(busy[::5]).reshape(-1, 2)).all()
+
+
+def test_nobody_jumps(busy: Walk) -> None:
+    steps = np.linalg.norm(np.diff(places(busy), axis=0), axis=2)
+    assert steps.max() < 1.5, "the change to another loop may skip to the middle of the sidewalk"
+    assert (steps < 0.3).mean() > 0.99
+
+
+def test_people_walk_at_a_walking_pace_and_look_where_they_go(busy: Walk) -> None:
+    before, after = places(busy)[:-1], places(busy)[1:]
+    step = after - before
+    length = np.linalg.norm(step, axis=2)
+    heading = np.array([[p.pose.heading for p in moment] for moment in busy[1:]])
+    walking = (length > 0.05) & (length < 0.3)
+    along = np.cos(np.arctan2(step[..., 1], step[..., 0]) - heading)
+    assert 0.7 < np.median(length[walking]) / DT < 1.8
+    assert np.mean(along[walking] > 0.9) > 0.97
+
+
+def test_people_cross_from_one_sidewalk_to_another(town02: RoadNetwork) -> None:
+    group = people(town02, 60, crossing=5.0)
+    loops = group.loop.copy()
+    walk(group, 40)
+    assert (loops != group.loop).sum() > 5
+
+
+def test_crossings_lead_straight_over_the_road_from_kerb_to_kerb(town: RoadNetwork) -> None:
+    found = [crossing for loop in find_walks(town).crossings for crossing in loop]
+    assert len(found) > 200
+    lines = shapely.linestrings(np.array([(crossing.start, crossing.end) for crossing in found]))
+    lengths, on_road = shapely.length(lines), shapely.length(shapely.intersection(lines, town.roadway))
+    assert lengths.min() > 5.0
+    assert lengths.max() < 23.0
+    assert on_road.min() > 3.5
+    assert np.percentile(lengths - on_road, 99) < 6.0, "a sidewalk's half at each end"
+    ends = shapely.points(np.array([end for crossing in found for end in (crossing.start, crossing.end)]))
+    assert shapely.distance(ends, town.roadway).min() > 1.0
+
+
+def test_equal_seeds_walk_equal_ways_and_others_do_not(town02: RoadNetwork) -> None:
+    first, again, other = (places(walk(people(town02, 20, seed, 5.0), 20)) for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.allclose(first, other)
+
+
+def test_people_cross_more_often_on_demand(town02: RoadNetwork) -> None:
+    seldom, often = (crossings(walk(people(town02, 100, 3, factor), 30)) for factor in (1.0, 5.0))
+    assert often > 2.5 * seldom > 0
+
+
+def test_without_the_wish_nobody_crosses(town02: RoadNetwork) -> None:
+    assert crossings(walk(people(town02, 100, 3, 0.0), 20)) == 0
+
+
+def test_more_people_than_sidewalks_hold_are_refused(town02: RoadNetwork) -> None:
+    with pytest.raises(ValueError, match=r"found 100000 people asked for, but town02 has room for \d+"):
+        people(town02, 100_000)
+
+
+def test_nobody_at_all_is_fine(town02: RoadNetwork) -> None:
+    assert walk(people(town02, 0), 1)[-1] == ()
+
+
+def test_people_walk_in_a_town_without_cars(town02: RoadNetwork) -> None:
+    group = people(town02, 30, crossing=50.0)
+    for _ in range(100):
+        group.step(DT, [])
+    assert len(group.states()) == 30
+
+
+def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float = 1.2) -> bool:
+    """Whether somebody at (x, y) may walk (dx, dy)."""
+    return bool(may_walk(np.array([(x, y)]), np.array([(dx, dy)]), np.array([pace]), [car])[0])
+
+
+def car(speed: float, heading: float = 0.0) -> VehicleState:
+    return VehicleState(Pose(0, 0, heading), speed, 4.2, 1.8)
+
+
+OVER_THE_LANE = (0.0, 7.0)  # m, from the kerb right of a car
+
+
+@pytest.mark.parametrize(("ahead", "speed", "free"), [(25.0, 6.0, False), (60.0, 6.0, True), (25.0, 0.0, True)])
+def test_people_reckon_with_a_slow_car_that_speeds_up_before_it_sees_them(
+    ahead: float, speed: float, free: bool
+) -> None:
+    assert may(car(speed), 2.1 + ahead, -2.2, *OVER_THE_LANE) is free
+
+
+@pytest.mark.parametrize("ahead", [4.0, 10.0, 20.0])
+def test_nobody_steps_in_front_of_a_fast_car(ahead: float) -> None:
+    assert not may(car(14.0), 2.1 + ahead, -2.2, *OVER_THE_LANE)
+
+
+@pytest.mark.parametrize("ahead", [1.5, 4.0, 20.0])
+def test_people_step_before_a_standing_car(ahead: float) -> None:
+    assert may(car(0.0), 2.1 + ahead, -2.2, *OVER_THE_LANE)
+
+
+def test_people_do_not_walk_into_the_side_of_a_standing_car() -> None:
+    assert not may(car(0.0), 0.0, -2.2, *OVER_THE_LANE)
+
+
+def test_people_step_behind_a_car_and_far_before_it() -> None:
+    assert may(car(8.0), -6.0, -2.2, *OVER_THE_LANE)
+    assert may(car(8.0), 60.0, -2.2, *OVER_THE_LANE)
+
+
+def test_a_driver_at_30_can_stop_for_whoever_steps_out_before_him() -> None:
+    speed = 30 / 3.6
+    nearest = min(x for x in np.arange(2.2, 60, 0.1) if may(car(speed), x, -2.06, *OVER_THE_LANE))
+    assert nearest - 2.1 > speed**2 / (2 * 8.0) + 0.2 * speed
+
+
+def test_whoever_already_stands_in_a_cars_way_goes_on_out_of_it() -> None:
+    assert may(car(10.0), 12.0, 0.5, 0.0, 3.0)
+
+
+def test_people_walk_freely_along_the_sidewalk_and_away_from_the_road() -> None:
+    assert may(car(14.0), 10.0, -3.5, 5.0, 0.0)
+    assert may(car(14.0), 10.0, -3.5, 0.0, -2.0)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, math.pi / 2, -2.5])
+def test_the_look_before_a_step_does_not_depend_on_the_compass(heading: float) -> None:
+    c, s = math.cos(heading), math.sin(heading)
+    for ahead in (5.0, 25.0, 70.0):
+        turned = [(c * x - s * y, s * x + c * y) for x, y in ((ahead, -2.5), OVER_THE_LANE)]
+        assert may(car(10.0, heading), *turned[0], *turned[1]) == may(car(10.0), ahead, -2.5, *OVER_THE_LANE)
+
+
+def test_nobody_is_run_over_on_a_street_where_a_fast_car_drives_up_and_down(town02: RoadNetwork) -> None:
+    lane = max(town02.driveable, key=lambda one: one.line.length).line
+    group, closest = people(town02, 80, 4, crossing=10.0), math.inf
+    for i in range(300):
+        pose = lane.pose_at((i * 1.2) % lane.length)
+        ego = VehicleState(pose, 12.0, 4.2, 1.8)
+        before = group.on_road.copy()
+        group.step(DT, [ego])
+        c, s = math.cos(pose.heading), math.sin(pose.heading)
+        d = group.position - (pose.x, pose.y)
+        stepped = group.on_road & ~before & (np.abs(-s * d[:, 0] + c * d[:, 1]) < 2.0)
+        ahead = (c * d[:, 0] + s * d[:, 1] - 2.1)[stepped]
+        closest = min([closest, *ahead[ahead > 0]])
+    assert closest > 12.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_whoever_stands_at_the_end_of_his_way_already_arrives_without_a_warning() -> None:
+    assert may(car(10.0), 12.0, 0.5, 0.0, 0.0)
