@@ -12,7 +12,7 @@ from caldrive.files import write_whole
 DRIVE = ["drive", "--agent", "oracle", "--seconds", "1"]
 MISTAKES = {
     "unknown verb": (["fly"], "fly"),
-    "no verb": ([], "Expected one of"),
+    "no verb": ([], "wanted one of drive, benchmark"),
     "unknown option": ([*DRIVE, "--wings", "2"], "--wings"),
     "no number": ([*DRIVE, "--cars", "many"], "--cars"),
     "unknown town": ([*DRIVE, "--town", "mars"], "town01, town02 or an OpenDRIVE file"),

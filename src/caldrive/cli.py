@@ -6,18 +6,20 @@ Exit codes: 0 for success, 1 where a check that was asked for says no, 2 for an 
 from __future__ import annotations
 
 import errno
-import io
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 import tyro
+from tyro import _errors  # its one way to hear of a mistake before it is printed in a box; pinned in pyproject.toml
 
-from caldrive.commands import Answer, Command
-from caldrive.progress import Progress, silent
+from caldrive.commands import VERBS, Answer, command_type, verb_words
+from caldrive.config import from_toml
+from caldrive.progress import progress_bar
 
 DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -27,8 +29,8 @@ STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code."""
     try:
-        command = _parse(arguments)
-        with _progress() as progress:
+        command = parse(sys.argv[1:] if arguments is None else arguments)
+        with progress_bar() as progress:
             answer: Answer = command.run(progress)
         _print(answer, command.json)
         return answer.code
@@ -42,23 +44,65 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-def _parse(arguments: Sequence[str] | None) -> Any:
-    """The command, or exit with one sentence in place of the parser's box."""
-    said = io.StringIO()
-    try:
-        with redirect_stderr(said):
-            return tyro.cli(Command, prog="caldrive", description=DESCRIPTION, args=arguments, config=STYLE)
-    except SystemExit as end:
-        if end.code:
-            raise ValueError(_first_message(said.getvalue())) from end
-        raise
+def parse(arguments: Sequence[str]) -> Any:
+    """The command that the words stand for. Raises ValueError with one sentence where they stand for none."""
+    verb = verb_words(arguments)
+    defaults = {verb: _defaults(verb, arguments)} if verb in VERBS else {}
+    with _errors.on_parse_error(lambda event: _refuse(event, verb)):
+        return tyro.cli(command_type(defaults), prog="caldrive", description=DESCRIPTION, args=arguments, config=STYLE)
 
 
-def _first_message(box: str) -> str:
-    """The text in the upper part of a box that the parser has drawn."""
-    lines = [line.strip("│ \n") for line in box.splitlines()[1:]]
-    end = next((i for i, line in enumerate(lines) if not line.strip("─╰╯")), len(lines))
-    return " ".join(lines[:end]).rstrip(".") + ": type caldrive --help"
+def _defaults(verb: str, arguments: Sequence[str]) -> Any:
+    """The verb's options before the command line changes them: a preset's, and those in a TOML file."""
+    kind = VERBS[verb].kind
+    presets = getattr(kind, "PRESETS", {})
+    name, file = _value(arguments, "--preset"), _value(arguments, "--config")
+    if name is not None and presets and name not in presets:
+        raise ValueError(
+            f"found preset {name!r}, wanted one of {', '.join(presets)}: type --preset {next(iter(presets))}"
+        )
+    if not file and not (name and presets):
+        return None
+    options = presets[name] if name and presets else kind()
+    return from_toml(Path(file), presets, options) if file else options
+
+
+def _value(arguments: Sequence[str], option: str) -> str | None:
+    """What stands behind an option, if it is there."""
+    for word, following in zip(arguments, [*arguments[1:], None], strict=True):
+        if word == option:
+            return following
+        if word.startswith(f"{option}="):
+            return word.partition("=")[2]
+    return None
+
+
+def _refuse(event: Any, verb: str) -> None:
+    """Raises ValueError with what the parser could not understand, in one sentence."""
+    here = f"caldrive {verb} --help" if verb in VERBS else "caldrive --help"
+    raise ValueError(f"{_mistake(event, verb)}: type {here}")
+
+
+def _mistake(event: Any, verb: str) -> str:
+    name = event.argument.display_name() if getattr(event, "argument", None) is not None else "an option"
+    match event:
+        case _errors.UnrecognizedArgs() if verb not in VERBS:
+            near = get_close_matches(" ".join(event.tokens[:1]), list(VERBS), 1)
+            return f"found {event.tokens[0]!r}, wanted a verb" + (f" such as {near[0]}" if near else "")
+        case _errors.UnrecognizedArgs():
+            return f"found {' '.join(event.tokens)!r}, which is no option of caldrive {verb}, wanted one that it has"
+        case _errors.MissingSubcommand():
+            return f"found no verb, wanted one of {', '.join(VERBS)}"
+        case _errors.MissingArgs():
+            missing = ", ".join(one.arg.display_name() for one in event.missing_arguments)
+            return f"found no {missing} behind caldrive {verb}, wanted it"
+        case _errors.BadValue():
+            return f"found {name} without a value, wanted one"
+        case _errors.InstantiationFailure():
+            return f"found that {name} cannot be ({' '.join(str(event.message).split())}), wanted another value"
+        case _errors.InvalidChoice():
+            return f"found {name} {event.value}, wanted one of {', '.join(event.choices)}"
+    return "found options that do not go together, wanted those that do"
 
 
 def _sentence(error: Exception) -> str:
@@ -68,27 +112,6 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"found that {error.filename} is no use ({error.strerror.lower()}), wanted one that is: give another"
     return " ".join(str(error).split()) or type(error).__name__
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """A bar on stderr, where people sit before it."""
-    if not sys.stderr.isatty():
-        yield silent
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=1.0)
-        yield lambda label, share: bar.update(task, description=label, completed=share)
 
 
 def _print(answer: Answer, as_json: bool) -> None:

@@ -31,30 +31,46 @@ def from_toml(path: Path, presets: Mapping[str, T], default: T) -> T:
     return overlaid(default if name is None else presets[name], values, str(path))
 
 
-def overlaid(defaults: T, values: dict[str, Any], where: str) -> T:
+def overlaid(defaults: T, values: Mapping[str, Any], where: str) -> T:
     """A dataclass with some of its fields replaced. where: what the values come from, for errors.
 
-    Raises ValueError for a field that it does not have, or a value of another type.
+    The fields of a nested dataclass whose metadata say `flat` are named without it. Raises ValueError for a field that
+    it does not have, or a value of another type.
     """
-    known = [field.name for field in fields(defaults)]  # type: ignore[arg-type]
-    hints = get_type_hints(type(defaults))
-    changes = {}
-    for name, value in values.items():
-        if name not in known:
-            raise ValueError(f"found {name} in {where}, wanted one of {', '.join(known)}: correct the name")
-        old = getattr(defaults, name)
-        if is_dataclass(old) and isinstance(value, dict):
-            changes[name] = overlaid(old, value, f"{where}, {name}")
-        else:
-            changes[name] = _converted(value, hints[name], f"{where}, {name}")
+    hints, changes = get_type_hints(type(defaults)), dict[str, Any]()
+    rest = dict(values)
+    for field in fields(defaults):  # type: ignore[arg-type]
+        old = getattr(defaults, field.name)
+        if field.metadata.get("flat"):
+            inside = {name: rest.pop(name) for name in _names(old) if name in rest}
+            changes[field.name] = overlaid(old, inside, where)
+        elif field.name in rest:
+            place, value = f"{where}, {field.name}", rest.pop(field.name)
+            nested = is_dataclass(old) and isinstance(value, dict)
+            changes[field.name] = overlaid(old, value, place) if nested else _converted(value, hints[field.name], place)
+    if rest:
+        known = [name for name in _names(defaults, flat=True) if name not in ("json", "config")]
+        raise ValueError(f"found {next(iter(rest))} in {where}, wanted one of {', '.join(known)}: correct the name")
     try:
         return replace(defaults, **changes)  # type: ignore[type-var]
     except ValueError as error:
-        raise ValueError(f"found in {where} what cannot be: {error}") from error
+        raise ValueError(f"found in {where} what cannot be ({error}): change it") from error
+
+
+def _names(settings: Any, flat: bool = False) -> list[str]:
+    """The names of a dataclass's fields; flat: with those of nested ones in the place of these."""
+    names = []
+    for field in fields(settings):
+        inside = flat and field.metadata.get("flat")
+        names += _names(getattr(settings, field.name)) if inside else [field.name]
+    return names
 
 
 def _converted(value: Any, kind: Any, where: str) -> Any:
+    def decode(wanted: type, value: Any) -> Any:
+        return Path(value) if wanted is Path and isinstance(value, str) else value
+
     try:
-        return msgspec.convert(value, kind, strict=True)
+        return msgspec.convert(value, kind, strict=True, dec_hook=decode)
     except msgspec.ValidationError as error:
-        raise ValueError(f"found {value!r} in {where} ({error}): give another value") from error
+        raise ValueError(f"found {value!r} in {where} ({error}), wanted another value: change it") from error

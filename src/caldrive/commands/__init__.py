@@ -5,41 +5,66 @@ What a verb needs is imported when it runs, so that `caldrive --help` waits for 
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
 from caldrive.commands.answer import Answer
-from caldrive.commands.benchmark import Benchmark
-from caldrive.commands.collect import Collect
-from caldrive.commands.data import Data
-from caldrive.commands.determinism import Determinism
-from caldrive.commands.drive import Drive
-from caldrive.commands.evaluate import Evaluate
-from caldrive.commands.replay import Replay
-from caldrive.commands.report import Report
+from caldrive.commands.benchmark import Benchmark, Replay, Report
+from caldrive.commands.collect import Collect, Data
+from caldrive.commands.drive import Determinism, Drive
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
-from caldrive.commands.train import Train
+from caldrive.commands.train import Evaluate, Train
 
-__all__ = ["Answer", "Command"]
+__all__ = ["VERBS", "Answer", "command_type", "verb_words"]
 
-Speed = (
-    Annotated[WorldSpeed, subcommand("world", description="Camera steps a second, and where the time goes.")]
-    | Annotated[AgentSpeed, subcommand("agent", description="Milliseconds from image to control.")]
-)
-Command = (
-    Annotated[Drive, subcommand("drive", description="Drive, film it, and say how it went.")]
-    | Annotated[Benchmark, subcommand("benchmark", description="Drive a whole suite, and count.")]
-    | Annotated[Replay, subcommand("replay", description="Drive a benchmark's episode again, and film it.")]
-    | Annotated[Report, subcommand("report", description="Tables and a page on one or more benchmarks.")]
-    | Annotated[Collect, subcommand("collect", description="Record what the oracle drives, for training.")]
-    | Annotated[Train, subcommand("train", description="Train the network on a recording.")]
-    | Annotated[Data, subcommand("data", description="Check and describe a recording.")]
-    | Annotated[Evaluate, subcommand("evaluate", description="How well a network sees recorded frames.")]
-    | Annotated[Town, subcommand("town", description="Draw a town on one page.")]
-    | Annotated[Speed, subcommand("speed", description="Measure how fast the world or the agent is.")]
-    | Annotated[
-        Determinism, subcommand("determinism", description="Drive the same episode twice and compare all bytes.")
-    ]
-)
+
+@dataclass(frozen=True)
+class Verb:
+    """A row of the command line: the class that holds the options, and a sentence for --help."""
+
+    kind: type[Any]
+    description: str
+
+
+VERBS: Mapping[str, Verb] = {
+    "drive": Verb(Drive, "Drive, film it, and say how it went."),
+    "benchmark": Verb(Benchmark, "Drive a whole suite, and count."),
+    "replay": Verb(Replay, "Drive a benchmark's episode again, and film it."),
+    "report": Verb(Report, "Tables and a page on one or more benchmarks."),
+    "collect": Verb(Collect, "Record what the oracle drives, for training."),
+    "data": Verb(Data, "Check and describe a recording."),
+    "train": Verb(Train, "Train the network on a recording."),
+    "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
+    "town": Verb(Town, "Draw a town on one page, or its plan."),
+    "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),
+    "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),
+    "determinism": Verb(Determinism, "Drive the same episode twice and compare all bytes."),
+}
+GROUPS = {"speed": "Measure how fast the world or the agent is."}  # first words of verbs of two words
+
+
+def verb_words(arguments: Sequence[str]) -> str:
+    """The verb at the beginning of a command line: one word, or two."""
+    return " ".join(arguments[: 2 if arguments and arguments[0] in GROUPS else 1])
+
+
+def command_type(defaults: Mapping[str, Any]) -> Any:
+    """All verbs as one type for the parser. defaults: a verb's options where they are not the usual ones."""
+    choices = [_choice(name, defaults) for name in VERBS if " " not in name]
+    for group, description in GROUPS.items():
+        inside = [_choice(name, defaults) for name in VERBS if name.startswith(f"{group} ")]
+        choices.append(Annotated[reduce(or_, inside), subcommand(group, description=description)])
+    return reduce(or_, choices)
+
+
+def _choice(name: str, defaults: Mapping[str, Any]) -> Any:
+    verb, more = VERBS[name], {}
+    if defaults.get(name) is not None:
+        more["default"] = defaults[name]
+    return Annotated[verb.kind, subcommand(name.rpartition(" ")[2], description=verb.description, **more)]

@@ -1,23 +1,24 @@
-"""`caldrive collect`: records what the oracle drives."""
+"""The verbs of a recording: record what the oracle drives, and check what was recorded."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated
 
+import tyro
 from tyro.conf import arg
 
 from caldrive.collection.config import CollectConfig
-from caldrive.commands.answer import Answer, Output
+from caldrive.commands.answer import Answer, Configurable, Output
 from caldrive.progress import Progress
 
 
 @dataclass(frozen=True, kw_only=True)
-class Collect(Output):
+class Collect(Configurable):
     """Record episodes that the oracle drives; what is there already is kept."""
 
-    recording: Annotated[CollectConfig, arg(name="")] = CollectConfig()
+    recording: Annotated[CollectConfig, arg(name="")] = field(default=CollectConfig(), metadata={"flat": True})
     out: Path = Path("out/recording")
     """Folder for the episodes."""
     workers: int = 2
@@ -36,3 +37,27 @@ class Collect(Output):
             pass
         counts = class_counts([read_episode(episode_path(self.out, k)) for k in range(self.recording.episodes)])
         return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Data(Output):
+    """Check every file and image of a recording, count its labels and draw their histograms."""
+
+    picture: Path = Path("out/recording.png")
+    """The PNG file for the histograms."""
+
+    folder: tyro.conf.Positional[Path] = Path("out/recording")
+    """Folder with the recorded episodes."""
+
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.checks import require_writable_file
+        from caldrive.commands.tables import recording_table
+        from caldrive.recordings.check import check_recording, draw_histograms
+
+        require_writable_file(self.picture, "--picture", ".png")
+        found, episodes = check_recording(self.folder, progress)
+        if episodes:
+            draw_histograms(episodes, found.counts, self.picture)
+        picture = self.picture if episodes else None
+        values = asdict(found) | {"picture": str(picture) if picture else None}
+        return Answer(values, recording_table(found, picture), int(bool(found.damaged)))

@@ -1,16 +1,16 @@
-"""The verb that drives episodes."""
+"""The verbs that drive: episodes, and the same episode twice."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
-from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import DriveSettings
+from caldrive.commands.answer import Answer, Configurable
+from caldrive.driving.settings import DeterminismSettings, DriveSettings
 from caldrive.progress import Progress
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive(DriveSettings, Output):
+class Drive(DriveSettings, Configurable):
     strict: bool = False
     """End with exit code 1 unless every episode reached its goal."""
 
@@ -20,3 +20,13 @@ class Drive(DriveSettings, Output):
 
         report = drive(self, progress)
         return Answer(report.values(), drive_table(report), int(self.strict and not report.all_reached))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Determinism(DeterminismSettings, Configurable):
+    def run(self, progress: Progress) -> Answer:
+        from caldrive.driving.determinism import check_determinism
+
+        found = check_determinism(self, progress)
+        said = found.difference or f"equal in all {found.steps} steps, sha256 {found.digest[:16]}"
+        return Answer(asdict(found) | {"equal": found.equal}, said, int(not found.equal))
