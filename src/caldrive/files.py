@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import is_dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -70,8 +71,8 @@ def _unknown(values: Any, known: Any) -> list[str]:
     """Names in nested dictionaries that `known` does not have."""
     if not isinstance(values, dict) or not isinstance(known, dict):
         return []
-    nested = [_unknown(value, known[name]) for name, value in values.items() if name in known]
-    return [name for name in values if name not in known] + sum(nested, [])
+    nested = (_unknown(value, known[name]) for name, value in values.items() if name in known)
+    return [*(name for name in values if name not in known), *chain.from_iterable(nested)]
 
 
 @contextmanager
