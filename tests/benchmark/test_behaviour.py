@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from caldrive.agents.cal import NOTHING
+from caldrive.agents.cal import UNKNOWN
 from caldrive.benchmark.behaviour import Behaviour, reds_obeyed
 from caldrive.control.longitudinal import DriveState
 from caldrive.datatypes import Affordances, Control, Decision, Observation, Pose, Step, Truth, VehicleState
@@ -78,6 +78,6 @@ def test_a_red_light_is_obeyed_where_the_car_stood_before_it_and_did_not_run_it(
 def test_a_blind_frame_is_no_right_answer() -> None:
     behaviour, true = Behaviour(), Affordances(hazard_stop=1.0)
     for k in range(10):
-        behaviour.add(step(k / 10, NOTHING if k < 5 else replace(true, hazard_stop=0.0), true))
+        behaviour.add(step(k / 10, UNKNOWN if k < 5 else replace(true, hazard_stop=0.0), true))
     figures = behaviour.figures([])
     assert (figures["error/hazard_stop"], figures["error/relative_angle"]) == (1.0, 0.0)

@@ -27,6 +27,15 @@ def test_a_car_that_stands_for_nothing_says_what_it_saw() -> None:
     assert red.what == "stood at no red light"
 
 
+def test_an_agent_without_affordances_left_its_lane_or_stood_all_the_same() -> None:
+    unseen = dict.fromkeys(("predicted_center_distance", "predicted_relative_angle", "predicted_hazard_stop"))
+    left = cause(trace(true_center_distance=after(200, 1.5), **unseen))
+    assert str(left) == "left its lane at (100, 0), straight: the agent does not say what it saw"
+    stop = {"state": after(300, "hazard stop", before="waiting"), "speed": after(300, 0.0, before=5.0)}
+    assert cause(trace(**stop, **unseen)).seen == left.seen
+    assert cause(trace(**stop | {"state": None}, **unseen)).what == "was too slow"
+
+
 def test_a_stop_that_is_right_or_short_is_no_cause() -> None:
     stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
     assert cause(trace(true_hazard_stop=after(300, 1.0), **stop)).what == "was too slow"

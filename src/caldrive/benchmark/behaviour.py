@@ -4,6 +4,7 @@ infraction, how long it was off its lane, and how many red lights it stopped for
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -49,11 +50,8 @@ class Behaviour:
         run = [one.time for one in infractions if one.kind is InfractionKind.RED_LIGHT]
         found: dict[str, Any] = {"off_lane": float(off.mean()), "reds_obeyed": reds_obeyed(time, red, speed, run)}
         for prefix, part in (("error", errors), *((f"before/{k}", part) for k, part in enumerate(before))):
-            known = part[~np.isnan(part).all(axis=1)]  # an agent may decide without affordances
-            if len(known):
-                found |= {
-                    f"{prefix}/{name}": float(v) for name, v in zip(NAMES, np.nanmean(known, axis=0), strict=True)
-                }
+            means = zip(NAMES, _means(part), strict=True)
+            found |= {f"{prefix}/{name}": value for name, value in means if not math.isnan(value)}
         return found
 
 
@@ -72,10 +70,23 @@ def reds_obeyed(time: Column, red: Column, speed: Column, run: Sequence[float]) 
     return sum(k not in lost and bool(speed[approach].min() < STANDING) for k, approach in enumerate(approaches))
 
 
+def _means(errors: NDArray[np.float64]) -> list[float]:
+    """The mean of each column (N, 6) over the steps in which it is known, NaN where it never is."""
+    known = errors[~np.isnan(errors).all(axis=1)]
+    if not len(known):
+        return [math.nan] * len(NAMES)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a column without numbers
+        return [float(value) for value in np.nanmean(known, axis=0)]
+
+
 def _errors(seen: Affordances, true: Affordances) -> tuple[float, ...]:
-    """1 for each discrete affordance that is wrong, and what the others are off by."""
-    if math.isnan(seen.hazard_stop):  # it saw nothing
-        return (math.nan,) * len(NAMES)
-    wrong = [float((getattr(seen, name) > 0.5) != (getattr(true, name) > 0.5)) for name in DISCRETE]
+    """1 for each discrete affordance that is wrong, and what the others are off by; NaN for those that are unknown."""
+    wrong = [_wrong(getattr(seen, name), getattr(true, name)) for name in DISCRETE]
     off = [abs(getattr(seen, name) - getattr(true, name)) for name in CONTINUOUS]
-    return (*wrong, float(seen.speed_sign != true.speed_sign), *off)
+    blind = all(map(math.isnan, (*wrong, *off)))  # then no sign is not seen: nothing is
+    return (*wrong, math.nan if blind else float(seen.speed_sign != true.speed_sign), *off)
+
+
+def _wrong(seen: float, true: float) -> float:
+    return math.nan if math.isnan(seen) else float((seen > 0.5) != (true > 0.5))

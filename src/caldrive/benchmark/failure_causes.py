@@ -16,6 +16,7 @@ Columns = Mapping[str, list[Any]]
 OFF_LANE, ASTRAY = 1.3, 3.0  # m from the centre line, where a wheel is over the marking of a lane of 4 m, and s of it
 BEFORE = 2.0  # s in which what is seen leads to what happens
 NEEDLESS, FLICKER = 10.0, 3.0  # s of a stop for nothing that make a goal be missed, and of a pause within either
+NOT_TOLD = "the agent does not say what it saw"
 GRID = 10.0  # m within which places are one
 
 
@@ -78,13 +79,16 @@ def _seen(trace: Columns, at: int, what: str) -> str:
             ("center_distance", "centre distance", "m"),
         ):
             seen, true = (np.array(trace[f"{kind}_{name}"], dtype=float)[before] for kind in ("predicted", "true"))
-            parts.append(f"{label} off by {np.abs(seen - true).mean():.2f} {unit}")
-        return ", ".join(parts)
+            wrong = np.abs(seen - true)
+            if np.isfinite(wrong).any():  # an agent may give no affordances
+                parts.append(f"{label} off by {np.nanmean(wrong):.2f} {unit}")
+        return ", ".join(parts) or NOT_TOLD
     stood = float(np.mean(np.array(trace["speed"]) < STANDING))
     if what == "was too slow":
         return f"stood for {100 * stood:.0f} % of the time"
     name = "hazard_stop" if "hazard" in what else "red_light"
-    return f"{name.replace('_', ' ')} seen with {trace[f'predicted_{name}'][at]:.2f}"
+    seen = trace[f"predicted_{name}"][at]
+    return NOT_TOLD if seen is None else f"{name.replace('_', ' ')} seen with {seen:.2f}"
 
 
 def common_places(causes: Iterable[Cause]) -> list[tuple[tuple[str, int, int, str], int]]:

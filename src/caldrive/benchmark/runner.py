@@ -21,7 +21,7 @@ from caldrive.benchmark.suites import SUITES, Trial, suite
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_writable_folder
 from caldrive.datatypes import Step
 from caldrive.driving.referee import Referee
-from caldrive.driving.rollout import run_episode
+from caldrive.driving.rollout import AgentError, run_episode
 from caldrive.driving.setup import set_up
 from caldrive.files import held
 from caldrive.parallel.processes import spread
@@ -49,7 +49,7 @@ def _let_go(driver: AgentSettings) -> None:
 
 
 def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
-    """What a worker does: drives one trial, and returns all that is kept of it."""
+    """What a worker does: drives one trial, and returns all that is kept of it. Raises AgentError with its key."""
     world, agent, ours = _set_up(driver)
     referee = Referee(trial.scenario, trial.fatal)
     behaviour, evidence = Behaviour(), Evidence(world, referee)
@@ -58,7 +58,10 @@ def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
         behaviour.add(step)
         evidence.add(step)
 
-    result = run_episode(world, agent, trial.scenario, watch, referee)
+    try:
+        result = run_episode(world, agent, trial.scenario, watch, referee)
+    except AgentError as error:
+        raise AgentError(f"{error} (in episode {trial.key})") from error
     figures = {name: plain(value) for name, value in behaviour.figures(result.infractions).items()}
     line = {"key": trial.key, "result": result_values(result), "figures": figures}
     return EpisodeRecord(line, evidence.files(trial.key, result), ours)

@@ -11,10 +11,10 @@ from time import perf_counter
 import numpy as np
 
 from caldrive.agents.registry import agent_entry, make_cal
-from caldrive.agents.settings import AgentSettings
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.control.controller import CALController, ControlConfig
 from caldrive.datatypes import DT, KMH, Affordances, CameraConfig, Command, Observation, Pose, Truth, VehicleState
+from caldrive.driving.rollout import next_step, reset_agent
 from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
 from caldrive.driving.setup import make_world
 from caldrive.interfaces import World, is_recordable
@@ -101,16 +101,16 @@ def measure_agent(settings: AgentSpeedSettings, progress: Progress = silent) -> 
     require_within("--steps", settings.steps, 1, MOST_STEPS, 300)
     threads = os.cpu_count() or 1 if settings.threads is None else settings.threads
     require_within("--threads", threads, 1, MOST_WORKERS, 2)
-    driver = AgentSettings(agent=settings.agent, model=settings.model)
     entry = agent_entry(settings.agent)
-    camera = entry.camera(driver) or CameraConfig()
-    agent = make_cal(driver, DT, threads) if settings.agent == "cal" else entry.make(driver, DT, _no_truth)
-    agent.reset()
+    camera = entry.camera(settings) or CameraConfig()
+    agent = make_cal(settings, DT, threads) if settings.agent == "cal" else entry.make(settings, DT, _no_truth)
+    reset_agent(agent)
     rng, took = np.random.default_rng(0), []
     for i in range(WARM_UP + settings.steps):
         image = rng.integers(0, 256, (camera.height, camera.width, 3), np.uint8)
+        observation = Observation(time=i * DT, image=image, speed=5.0, command=Command.STRAIGHT)
         start = perf_counter()
-        agent.act(Observation(0.1 * i, image, 5.0, Command.STRAIGHT))
+        next_step(agent, observation, i)
         took.append(1000 * (perf_counter() - start))
         progress("images", i / (WARM_UP + settings.steps))
     median, p99 = np.percentile(took[WARM_UP:], (50, 99))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import Any
 
+import numpy as np
+
 from caldrive.datatypes import Affordances, Step
 from caldrive.files import json_line
 from caldrive.results import EpisodeResult, plain, result_values
@@ -33,6 +35,11 @@ def _row(step: Step) -> dict[str, Any]:
     return row
 
 
+def _as_python(value: Any) -> Any:
+    """NumPy's numbers, which an agent of one's own may give, as Python's."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
 class Trace:
     """Collects an episode's steps. Units as in `datatypes`: s, m, rad, m/s; limits and targets in km/h."""
 
@@ -40,7 +47,8 @@ class Trace:
         self._rows: list[dict[str, Any]] = []
 
     def add(self, step: Step) -> None:
-        self._rows.append({name: plain(value) for name, value in _row(step).items()})
+        """One more step."""
+        self._rows.append({name: plain(_as_python(value)) for name, value in _row(step).items()})
 
     def columns(self) -> dict[str, list[Any]]:
         """One list for each name, one entry for each step."""

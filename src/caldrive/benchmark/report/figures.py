@@ -31,6 +31,9 @@ BIN, SLOTS = 5.0, 240  # s, and how many
 SHOWN = ("relative_angle", "center_distance", "vehicle_distance")
 
 
+NO_ERRORS = np.zeros((len(SHOWN), 2, SLOTS))
+
+
 def svg(figure: Figure) -> str:
     """A figure as text that depends on nothing but its content."""
     buffer = io.StringIO()
@@ -112,22 +115,27 @@ def _error_sums(columns: dict[str, list[Any]], name: str) -> NDArray[np.float64]
 
 
 def errors_figure(runs: Sequence[BenchmarkRun]) -> str:
-    """Mean absolute error of the continuous affordances over the time since the start."""
+    """Mean absolute error of the continuous affordances over the time since the start; no figure without any."""
+    sums = {run.name: sum((_all_error_sums(columns) for columns in traces(run)), NO_ERRORS) for run in runs}
+    if not any(counts[:, 0].any() for counts in sums.values()):
+        return ""
     figure = Figure(figsize=(12, 3.2), layout="constrained")
     axes = figure.subplots(1, len(SHOWN))
-    for k, run in enumerate(runs):
-        sums = np.zeros((len(SHOWN), 2, SLOTS))
-        for columns in traces(run):
-            sums += [_error_sums(columns, name) for name in SHOWN]
-        for ax, name, (count, wrong) in zip(axes, SHOWN, sums, strict=True):
+    for k, (agent, of_agent) in enumerate(sums.items()):
+        for ax, name, (count, wrong) in zip(axes, SHOWN, of_agent, strict=True):
             enough = count > 50
             at = (np.arange(SLOTS) * BIN)[enough]
-            ax.plot(at, wrong[enough] / count[enough], color=COLORS[k % len(COLORS)], label=run.name)
+            ax.plot(at, wrong[enough] / count[enough], color=COLORS[k % len(COLORS)], label=agent)
             ax.set(title=name.replace("_", " "), xlabel="s since the start")
     for ax in axes:
         ax.set_ylim(bottom=0)
     _legend(axes[0])
     return svg(figure)
+
+
+def _all_error_sums(columns: dict[str, list[Any]]) -> NDArray[np.float64]:
+    """`_error_sums` of each of SHOWN (3, 2, SLOTS)."""
+    return np.stack([_error_sums(columns, name) for name in SHOWN])
 
 
 def speed_figure(runs: Sequence[BenchmarkRun]) -> str:

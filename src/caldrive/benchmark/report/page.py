@@ -28,8 +28,8 @@ def report_page(runs: Sequence[BenchmarkRun]) -> str:
         "Errors of the affordances over time": errors_figure(runs),
         "Speed over distance": speed_figure(runs),
     }
-    plots = {name: f"<section><h2>{escape(name)}</h2>{made}</section>" for name, made in figures.items()}
-    first, *rest = plots.values()
+    plots = (f"<section><h2>{escape(name)}</h2>{made}</section>" for name, made in figures.items() if made)
+    first, *rest = plots
     body = [_table(about), _table(success), first, *map(_table, others), *rest, _failures(runs)]
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>caldrive benchmark</title>'

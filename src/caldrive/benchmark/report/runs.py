@@ -117,6 +117,8 @@ def _cause(folder: Path, one: Driven) -> Cause | None:
 def _before(one: Driven, k: int) -> str:
     """The affordances that were off in the seconds before infraction k."""
     found = {n.split("/")[2]: v for n, v in one.figures.items() if n.startswith(f"before/{k}/") and v is not None}
+    if not found:
+        return "not known"
     limits = {"vehicle_distance": 3.0, "relative_angle": 0.1, "center_distance": 0.3}
     wrong = [f"{n.replace('_', ' ')} {v:.2f} {UNITS[n]}" for n, v in found.items() if n in UNITS and v > limits[n]]
     wrong += [f"{n.replace('_', ' ')} {100 * v:.0f} %" for n, v in found.items() if n not in UNITS and v > 0.2]

@@ -26,10 +26,9 @@ class Table:
 
 
 def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
-    """All tables of the report."""
-    return [
-        _about(runs), _success(runs), _infractions(runs), _lights(runs), _comfort(runs), _errors(runs), _causes(runs)
-    ]  # fmt: skip
+    """All tables of the report: the runs, their success, and of the others those that say something."""
+    others = _infractions(runs), _lights(runs), _comfort(runs), _errors(runs), _causes(runs)
+    return [_about(runs), _success(runs), *(table for table in others if table.rows)]
 
 
 def _about(runs: Sequence[BenchmarkRun]) -> Table:
@@ -126,17 +125,22 @@ def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
 
 
 def _errors(runs: Sequence[BenchmarkRun]) -> Table:
-    rows: list[tuple[str, ...]] = []
-    heads: tuple[str, ...] = ()
-    for run in runs:
-        for condition in conditions([run]):
-            found = errors(run.only(condition))
-            heads = tuple(f"{n.replace('_', ' ')} {UNITS.get(n, '% wrong')}" for n in found) or heads
-            rows.append((
-                run.name, condition, *(f"{v:.3f}" if k in UNITS else f"{100 * v:.2f}" for k, v in found.items())
-            ))  # fmt: skip
+    found = {
+        (run.name, condition): errors(run.only(condition)) for run in runs for condition in conditions([run])
+    }  # fmt: skip
+    names = list(dict.fromkeys(name for values in found.values() for name in values))
+    rows = [
+        (*place, *(_error(name, values[name]) if name in values else "" for name in names))
+        for place, values in found.items()
+        if values  # an agent may give no affordances
+    ]
+    heads = (f"{name.replace('_', ' ')} {UNITS.get(name, '% wrong')}" for name in names)
     text = "What the affordances were off by while driving: share of wrong frames, or mean absolute error."
     return Table("Affordances while driving", text, ("agent", "condition", *heads), tuple(rows))
+
+
+def _error(name: str, value: float) -> str:
+    return f"{value:.3f}" if name in UNITS else f"{100 * value:.2f}"
 
 
 def _causes(runs: Sequence[BenchmarkRun]) -> Table:
