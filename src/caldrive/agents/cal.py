@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from caldrive.datatypes import Affordances, Control, Decision, Observation
 from caldrive.interfaces import BadImage, Controller, Perception, TruthSource
@@ -37,12 +38,12 @@ class CALAgent:
         Raises TypeError where the controller returns something else than a Decision.
         """
         affordances, note = self._see(observation)
-        decision = self.controller.step(affordances, observation.speed, observation.command)
+        decision: Any = self.controller.step(affordances, observation.speed, observation.command)
         if not isinstance(decision, Decision) or not isinstance(decision.control, Control):
             name = type(self.controller).__name__
             raise TypeError(f"the controller {name} returned {decision!r}, wanted a Decision with a Control")
         self.decision = replace(decision, note=note or decision.note)
-        return self.decision.control
+        return decision.control
 
     def _see(self, observation: Observation) -> tuple[Affordances, str]:
         """The affordances, or UNKNOWN and why."""
