@@ -121,13 +121,6 @@ def test_truth_stands_beside_only_where_it_is_asked_for(minimap: MiniMap) -> Non
     assert (panel(minimap, one, truth=True) != panel(minimap, one)).any()
 
 
-def test_the_truth_is_shown_of_an_agent_that_gives_no_reasons(minimap: MiniMap) -> None:
-    silent = replace(step(), decision=None)
-    hazard = replace(silent, truth=replace(silent.truth, affordances=Affordances(hazard_stop=1.0)))
-    assert (panel(minimap, silent, truth=True) != panel(minimap, hazard, truth=True)).any()
-    assert (panel(minimap, silent) == panel(minimap, hazard)).all()
-
-
 def test_affordances_that_are_no_numbers_can_be_drawn(minimap: MiniMap) -> None:
     blind = step(Affordances(*(math.nan,) * 2, None, *(math.nan,) * 3), note="the image is black")
     assert count(panel(minimap, blind), AMBER) == 0

@@ -107,23 +107,21 @@ def draw_frame(draw: Draw, truth: bool) -> None:
             track(draw, _box(row))
 
 
-def draw_gauges(draw: Draw, seen: Affordances | None, true: Affordances | None) -> None:
-    """All six values. seen: None where the agent gives none; true: None leaves the truth out."""
+def draw_gauges(draw: Draw, seen: Affordances, true: Affordances | None) -> None:
+    """All six values; true: None leaves the truth out."""
     for row, gauge in enumerate(GAUGES):
-        value = math.nan if seen is None else float(getattr(seen, gauge.name) or 0.0)
+        value = float(getattr(seen, gauge.name) or 0.0)
         real = None if true is None else float(getattr(true, gauge.name) or 0.0)
         middle = TOP + ROW * (row + 0.5)
-        if seen is not None:
-            write(draw, (VALUE, middle), gauge.text(value) if math.isfinite(value) else "?", 16, TEXT, "rm")
+        write(draw, (VALUE, middle), gauge.text(value) if math.isfinite(value) else "?", 16, TEXT, "rm")
         if real is not None:
             write(draw, (TRUE, middle), gauge.text(real), 13, MUTED, "rm")
         if gauge.name == "speed_sign":
             _draw_signs(draw, row, value, real)
-            continue
-        if math.isfinite(value):
+        elif math.isfinite(value):
             fill(draw, _box(row), gauge.rest, gauge.share(value), gauge.color)
-        if real is not None:
-            tick(draw, _box(row), gauge.share(real))
+            if real is not None:
+                tick(draw, _box(row), gauge.share(real))
 
 
 def _draw_signs(draw: Draw, row: int, value: float, real: float | None) -> None:

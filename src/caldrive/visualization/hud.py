@@ -139,8 +139,8 @@ class Hud:
         write(draw, (64, 128), step.observation.command.value, 16, TEXT, "mm")
         _draw_speed(panel, draw, step.observation.speed, step.decision)
         _draw_controls(draw, step)
-        seen = step.decision.affordances if step.decision is not None else None
-        draw_gauges(draw, seen, step.truth.affordances if self.truth else None)
+        if step.decision is not None and step.decision.affordances is not None:
+            draw_gauges(draw, step.decision.affordances, step.truth.affordances if self.truth else None)
         if self.minimap is not None:
             panel.paste(self.minimap.draw(step.truth), (CAMERA.width - PANEL, 0))
         return np.asarray(panel)

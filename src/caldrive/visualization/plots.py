@@ -38,9 +38,7 @@ def draw_speed(columns: Mapping[str, Sequence[Any]], title: str, path: Path) -> 
             ax.axvspan(done[rows[0]], reach, color=SHADES[state], lw=0, label=None if state in labelled else state)
             labelled.add(state)
     ax.step(done, columns["road_limit"], "k--", lw=1, label="limit on the signs", where="post")
-    if any(limit is not None for limit in columns["speed_limit"]):  # an agent may give no reasons
-        limits = np.array(columns["speed_limit"], dtype=float)
-        ax.step(done, limits, color="#c8782d", lw=1.5, label="limit that the agent keeps to", where="post")
+    ax.step(done, columns["speed_limit"], color="#c8782d", lw=1.5, label="limit that the agent keeps to", where="post")
     ax.plot(done, np.array(columns["speed"]) / KMH, color="#1f4e79", lw=2, label="speed")
     ax.set(title=title, xlabel="m along the route", ylabel="km/h", xlim=(0, None), ylim=(0, None))
     figure.legend(loc="outside right upper", fontsize=8)
