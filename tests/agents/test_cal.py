@@ -46,7 +46,7 @@ class FailingCamera(StraightRoad):
 def free_road_network() -> Network:
     network = Network(TINY)
     for name, biases in FREE.items():
-        for group in network.blocks[name].groups:
+        for group in network.blocks[name].groups:  # type: ignore[union-attr]
             torch.nn.init.zeros_(group.output.weight)
             group.output.bias.data = torch.tensor(biases)
     return network

@@ -191,12 +191,12 @@ def test_nonsense_in_a_benchmarks_worker_names_the_episode(
 ) -> None:
     agent = write_agent(tmp_path, "def act(self, observation):\n    return Control(0.0) if observation.time < 1 else 7")
     for workers in ("1", "2"):
-        said = refusal(
+        message = refusal(
             *(capsys, "benchmark", "--agent", agent, "--suite", str(short_suite), "--workers", workers),
             *("--out", str(tmp_path / "out")),
         )
-        assert "Own returned 7 at step 10 (1.0 s), wanted a Control" in said
-        assert "in episode town01-w01-" in said
+        assert "Own returned 7 at step 10 (1.0 s), wanted a Control" in message
+        assert "in episode town01-w01-" in message
 
 
 @pytest.mark.parametrize(
@@ -223,8 +223,8 @@ def test_an_option_that_it_would_never_see_is_refused(
     option: str, agent: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     value = "paper" if option == "controller" else str(tmp_path)
-    said = refusal(capsys, *DRIVE, "--agent", agent, f"--{option}", value, "--out", str(tmp_path / "out"))
-    assert f"but Cruiser takes none: leave --{option} out" in said
+    message = refusal(capsys, *DRIVE, "--agent", agent, f"--{option}", value, "--out", str(tmp_path / "out"))
+    assert f"but Cruiser takes none: leave --{option} out" in message
 
 
 def test_a_decision_may_say_some_things_only_and_in_numpys_numbers(short_suite: Path, tmp_path: Path) -> None:

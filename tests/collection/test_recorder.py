@@ -13,12 +13,12 @@ import pytest
 from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.oracles import HiddenCarsOracle, TailgatingOracle
-from caldrive.collection.recorder import BASELINES, episode_path, record_episode
+from caldrive.collection.recorder import BASELINES, record_episode
 from caldrive.collection.start_poses import EpisodePlan, begin_episode, plan_episode
 from caldrive.control.controller import CALController
 from caldrive.datatypes import CameraConfig, Semantic
 from caldrive.recordings.reader import Episode, read_episode
-from caldrive.recordings.writer import EpisodeError
+from caldrive.recordings.writer import EpisodeError, episode_path
 from caldrive.world.embedded import EmbeddedWorld
 
 TINY = CollectConfig("town02", (1, 6), duration=2.0, cars=6, people=10, tailgating=0.0, width=48, height=24, seed=4)
@@ -111,17 +111,17 @@ def test_weathers_take_turns(recorded: list[Episode]) -> None:
 
 
 def test_episodes_differ_in_start_and_seed(recorded: list[Episode]) -> None:
-    found = [episode.scenario for episode in recorded]
-    assert len({one.seed for one in found}) == len({one.start for one in found}) == 3
+    scenarios = [episode.scenario for episode in recorded]
+    assert len({scenario.seed for scenario in scenarios}) == len({scenario.start for scenario in scenarios}) == 3
 
 
 def test_semantic_images_are_recorded_where_they_are_asked_for(
     world: EmbeddedWorld, episode: Episode, tmp_path: Path
 ) -> None:
-    found = recording(world, replace(TINY, semantic=True), tmp_path, semantic=True)
-    assert found.semantic(5).shape == found.image(5).shape[:2]
-    assert Semantic.ROAD in found.semantic(5)
-    assert found.jpegs == episode.jpegs
+    with_semantics = recording(world, replace(TINY, semantic=True), tmp_path, semantic=True)
+    assert with_semantics.semantic(5).shape == with_semantics.image(5).shape[:2]
+    assert Semantic.ROAD in with_semantics.semantic(5)
+    assert with_semantics.jpegs == episode.jpegs
     assert read_episode(episode_path(tmp_path, 0)).semantics is None
     with pytest.raises(EpisodeError, match="record with --semantic"):
         episode.semantic(5)
