@@ -61,7 +61,7 @@ _RIGHT = ((0.8, -0.2), (0.25, 0.3), (0.25, -0.02), (-0.12, -0.02), (-0.12, 0.75)
 
 
 @lru_cache(maxsize=3)
-def _arrow(command: Command) -> Picture.Image:
+def command_sign(command: Command) -> Picture.Image:
     """A blue sign with a white arrow."""
     side, scale = int(TILE[2] - TILE[0]), 4
     picture = Picture.new("RGB", (side * scale, side * scale), BACKGROUND)
@@ -135,7 +135,7 @@ class Hud:
     def _panel(self, step: Step) -> Image:
         panel = _frame(self.truth).copy()
         draw = ImageDraw.Draw(panel)
-        panel.paste(_arrow(step.observation.command), (TILE[0], TILE[1]))
+        panel.paste(command_sign(step.observation.command), (TILE[0], TILE[1]))
         write(draw, (64, 128), step.observation.command.value, 16, TEXT, "mm")
         _draw_speed(panel, draw, step.observation.speed, step.decision)
         _draw_controls(draw, step)
@@ -156,14 +156,14 @@ class Hud:
         write(draw, (CAMERA.width - 16, HEADER / 2), f"{step.truth.time:.1f}{limit} s", 17, TEXT, "rm")
         if step.decision is not None and step.decision.state is not None:
             color = STATES.get(step.decision.state, OTHER_STATE)
-            _badge(draw, (16, HEADER + 12), step.decision.state, color, step.decision.note)
+            draw_badge(draw, (16, HEADER + 12), step.decision.state, color, step.decision.note)
         recent = [one for one in infractions if step.truth.time - one.time < BANNER_TIME]
         if recent:
             _banner(draw, CAMERA.height - 40, recent[-1].kind.value, RED)
         return np.asarray(picture)
 
 
-def _badge(draw: Draw, at: tuple[float, float], text: str, color: Color, note: str) -> None:
+def draw_badge(draw: Draw, at: tuple[float, float], text: str, color: Color, note: str) -> None:
     """A coloured label with the agent's state, and its note if there is one."""
     width = draw.textlength(text.upper(), font(17)) + 28
     draw.rounded_rectangle((at[0], at[1], at[0] + width, at[1] + 32), 8, fill=color)
