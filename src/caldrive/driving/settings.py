@@ -98,7 +98,7 @@ class SeeSettings:
     """Run the network on your own video or pictures. It knows only the embedded towns: in other pictures its values
     may mean nothing."""
 
-    source: Positional[Path]
+    source: Annotated[Positional[Path], arg(metavar="VIDEO_OR_FOLDER")]
     """A video, a folder of pictures (.png, .jpg; by name, 10 a second), or one picture."""
     crop: Annotated[str | None, arg(metavar="A:B")] = None
     """Rows A to B of each picture to look at, counted from the top; the authors keep 120:480 of their 600."""
@@ -106,8 +106,8 @@ class SeeSettings:
     """What the navigation system asks for at the next junction, in all pictures."""
     model: Path | None = None
     """The network, a .safetensors file; without it the one in the package."""
-    every: int = 1
-    """Take every so many-th picture only; the network learnt at 10 a second, so that 3 suits a video of 30."""
+    every: Annotated[int, arg(metavar="N")] = 1
+    """Take only every Nth picture: the network learnt at 10 a second, so that 3 suits a video of 30."""
     out: Path = Path("out/see.mp4")
     """The video to write, an .mp4 file."""
     values: Path | None = None
