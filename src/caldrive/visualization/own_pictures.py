@@ -70,8 +70,7 @@ class SeenFrames:
         write(draw, (64, 128), self.command.value, 16, TEXT, "mm")
         self._write_numbers(draw, seen)
         draw_frame(draw, truth=False)
-        if seen.affordances is not None:
-            draw_gauges(draw, seen.affordances, None)
+        draw_gauges(draw, seen.affordances, None)
         write(draw, (NETWORK_VIEW[0], TOP - 12), "what the network is given", 13, MUTED)
         _paste_within(panel, seen.network_image, NETWORK_VIEW)
         return np.asarray(panel)

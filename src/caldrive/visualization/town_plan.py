@@ -22,7 +22,7 @@ from caldrive.world.roads.towns import load_roads
 
 USUAL_WIDTH, LEAST_WIDTH = 1600, 1000  # pixels
 DPI = 100
-FLATTEST, STEEPEST = 0.3, 1.4  # the map's height in its widths; a narrower town gets free ground around it
+FLATTEST, STEEPEST = 0.3, 1.4  # the map's height in its widths; a flatter or steeper town gets free ground around it
 AROUND = 0.04  # free ground around the roads, as a share of the longer side
 EDGES = (88, 34, 70, 146)  # pixels left, right, above and below the map, for the figures and the words
 STEPS = 9  # labelled lines of the grid from west to east, about
@@ -194,7 +194,8 @@ def _outline(lane: Lane) -> Points:
 def write_plan(town: str, path: Path, width: int | None = None) -> tuple[int, int]:
     """Writes a town's map as a PNG; returns (width, height) in pixels.
 
-    Raises ValueError, FileNotFoundError or OSError for an unknown town, a name that is no .png, a locked door.
+    Raises ValueError, FileNotFoundError or OSError for an unknown town, a name that is no .png, a place that cannot be
+    written to.
     """
     require_writable_file(path, "--plan", ".png")
     width = USUAL_WIDTH if width is None else width
