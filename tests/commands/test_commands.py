@@ -196,7 +196,7 @@ def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
         "print('loaded', *{'torch', 'libsumo', 'moderngl', 'numpy', 'av'} & sys.modules.keys())"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert all(verb in shown for verb in ("drive", "town", "speed", "determinism"))
+    assert all(verb in shown for verb in ("drive", "see", "town", "speed", "determinism"))
     assert shown.splitlines()[-1].strip() == "loaded"
 
 

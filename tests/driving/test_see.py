@@ -71,7 +71,7 @@ def test_a_picture_of_another_shape_is_named_with_rows_that_fit() -> None:
 
 def test_a_crop_outside_a_picture_is_refused_with_its_rows() -> None:
     viewer = Viewer(Brightness(), SIZE, Command.STRAIGHT, (20, 91))
-    with pytest.raises(ValueError, match=r"found --crop 20:91 where picture 1 has 90 rows.*type --crop 18:72"):
+    with pytest.raises(ValueError, match=r"found --crop 20:91 where picture 0 has 90 rows.*type --crop 18:72"):
         viewer.look(picture(stripes()), "")
 
 

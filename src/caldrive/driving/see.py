@@ -57,7 +57,7 @@ class SeeReport:
 def see(settings: SeeSettings, progress: Progress = silent) -> SeeReport:
     """Runs the network on a video, a folder of pictures or one picture; writes a video and the affordances' values.
 
-    The values have a row for each picture: its number, its file, its time (s), the affordances in the units of
+    The values have a row for each picture: its number from 0, its file, its time (s), the affordances in the units of
     `affordances.SPECS` (a speed sign of 0 stands for none), and a note; without numbers where a picture tells nothing.
     Raises ValueError, FileNotFoundError or OSError with what to type where it cannot be done.
     """
@@ -101,9 +101,9 @@ def _film(
     """Adds every so many-th picture to the video; returns the values, one row for each."""
     frames = SeenFrames(f"{source.name[:LONGEST_NAME]}   {WARNING}", viewer.command)
     rows = []
-    of = f" of {source.count}" if source.count else ""
+    of = f" of 0-{source.count - 1}" if source.count else ""  # numbered from 0, as in the values
     for picture in islice(source, 0, None, every):
-        label = f"{picture.number + 1}{of}"
+        label = f"{picture.number}{of}"
         progress(f"picture {label}", min(1.0, picture.number / source.count) if source.count else 0.0)
         seen = viewer.look(picture, label)
         video.add(frames.draw(seen))
@@ -147,7 +147,7 @@ class Viewer:
         if self.crop is None:
             return 0, height
         if self.crop[1] > height:
-            which = picture.file or f"picture {picture.number + 1}"
+            which = picture.file or f"picture {picture.number}"
             raise ValueError(
                 f"found --crop {self.crop[0]}:{self.crop[1]} where {which} has {height} rows, wanted rows within it: "
                 f"type --crop {height // 5}:{height * 4 // 5}"
