@@ -35,10 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words == ["--version"]:
         return _answered(Answer({"version": __version__}, f"caldrive {__version__}"), as_json=False)
     try:
-        with only_answers_on_stdout():
-            command = parse(words)
-            with progress_bar() as progress:
-                answer: Answer = command.run(progress)
+        command = parse(words)
+        with only_answers_on_stdout(), progress_bar() as progress:
+            answer: Answer = command.run(progress)
         return _answered(answer, command.json)
     except KeyboardInterrupt:
         _say("caldrive: stopped by Ctrl-C")
