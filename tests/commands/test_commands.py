@@ -21,7 +21,7 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.cli import _print, main
 from caldrive.commands.answer import Answer
 from caldrive.datatypes import Command, Observation
-from caldrive.driving.determinism import Digests, compare
+from caldrive.driving.determinism import EpisodeDigests, compare
 from caldrive.driving.speed import Stopwatch
 from caldrive.perception.network.config import BlockConfig, PerceptionConfig
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
@@ -174,17 +174,23 @@ def test_two_fresh_processes_drive_the_same_bytes() -> None:
 def test_a_comparison_names_the_first_step_and_part_that_differ() -> None:
     steps = tuple(("image", "truth", "decision", f"control{i}") for i in range(5))
     other = (*steps[:3], ("image", "truth", "decision", "another"), steps[4])
-    assert compare(Digests(steps, "r"), Digests(steps, "r")).equal
-    assert compare(Digests(steps, "r"), Digests(other, "r")).difference == "step 3 (0.3 s) differs in its control"
+    assert compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps, "r")).equal
     assert (
-        compare(Digests(steps, "r"), Digests(steps[:4], "r")).difference
+        compare(EpisodeDigests(steps, "r"), EpisodeDigests(other, "r")).difference
+        == "step 3 (0.3 s) differs in its control"
+    )
+    assert (
+        compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps[:4], "r")).difference
         == "one run ends after 4 steps, the other goes on"
     )
-    assert compare(Digests(steps, "r"), Digests(steps, "q")).difference == "the results differ, though no step does"
+    assert (
+        compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps, "q")).difference
+        == "the results differ, though no step does"
+    )
 
 
 def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    different = compare(Digests((("a",) * 4,), "r"), Digests((("b",) * 4,), "r"))
+    different = compare(EpisodeDigests((("a",) * 4,), "r"), EpisodeDigests((("b",) * 4,), "r"))
     monkeypatch.setattr("caldrive.driving.determinism.check_determinism", lambda *_: different)
     assert main(["determinism"]) == 1
     assert "step 0 (0.0 s) differs in its image" in capsys.readouterr().out

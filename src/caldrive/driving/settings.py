@@ -80,13 +80,9 @@ class WorldSpeedSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AgentSpeedSettings:
+class AgentSpeedSettings(AgentSettings):
     """Milliseconds from image to control."""
 
-    agent: str = "cal"
-    """Which agent: cal, oracle, or your own: package.module:Class or file.py:Class."""
-    model: Path | None = None
-    """The network, a .safetensors file; without it the one in the package."""
     steps: int = 300
     """How many images to measure."""
     threads: int | None = None
