@@ -13,7 +13,6 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from PIL import Image as Picture
 from rich.table import Table
 from rich.text import Text
 
@@ -179,24 +178,13 @@ def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: py
     assert "step 0 (0.0 s) differs in its image" in capsys.readouterr().out
 
 
-def test_town_writes_its_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def sheet(town: str, randomised: int) -> np.ndarray[Any, Any]:
-        return np.full((40, 80, 3), len(town) + randomised, np.uint8)
-
-    monkeypatch.setattr("caldrive.visualization.contact_sheet.contact_sheet", sheet)
-    found = run_json("town", "--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
-    assert (found["width"], found["height"]) == (160, 80)
-    assert Picture.open(found["sheet"]).size == (160, 80)
-    assert [p.name for p in (tmp_path / "a").iterdir()] == ["town.png"]
-
-
 def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
     code = (
         "import sys\nfrom caldrive.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
         "print('loaded', *{'torch', 'libsumo', 'moderngl', 'numpy', 'av'} & sys.modules.keys())"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert all(verb in shown for verb in ("drive", "town", "speed", "determinism"))
+    assert all(verb in shown for verb in ("drive", "see", "town", "speed", "determinism"))
     assert shown.splitlines()[-1].strip() == "loaded"
 
 
