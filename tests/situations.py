@@ -78,7 +78,7 @@ def driven(world: EmbeddedWorld, agent: Agent, scenario: Scenario) -> list[float
             rows.append([astuple(step.truth.affordances), step.truth.opposite_share, step.truth.speed_limit])
 
     result = run_episode(world, agent, scenario, watch, Referee(scenario))
-    return list(numbers([rows, result_values(result), metrics.metrics(result.infractions)]))
+    return list(numbers([rows, result_values(result), metrics.compute(result.infractions)]))
 
 
 def limited(town: str, task: str, number: int, weather: int = 6, **traffic: int) -> Scenario:

@@ -28,7 +28,7 @@ def test_errors_are_means_over_the_episode_and_over_the_seconds_before_an_infrac
     for k in range(100):
         wrong = replace(true, relative_angle=0.3, hazard_stop=0.9) if k >= 75 else true
         episode.add(step(k / 10, wrong, true))
-    metrics = episode.metrics([Infraction(InfractionKind.SIDEWALK, 9.9, 0, 0)])
+    metrics = episode.compute([Infraction(InfractionKind.SIDEWALK, 9.9, 0, 0)])
     assert metrics["error/relative_angle"] == pytest.approx(0.3 * 0.25)
     assert metrics["error/hazard_stop"] == pytest.approx(0.25)
     assert metrics["before/0/relative_angle"] == pytest.approx(0.3 * 25 / 30, abs=0.011)
@@ -39,7 +39,7 @@ def test_time_off_the_lane_counts() -> None:
     episode, true = EpisodeMetrics(), Affordances()
     for k in range(60):
         episode.add(step(k / 10, true, true, opposite=0.5 if k < 15 else 0.1))
-    assert episode.metrics([])["off_lane"] == pytest.approx(0.25)
+    assert episode.compute([])["off_lane"] == pytest.approx(0.25)
 
 
 def test_all_figures_are_jsons() -> None:
@@ -47,7 +47,7 @@ def test_all_figures_are_jsons() -> None:
     for k in range(20):
         seen = step(k / 10, red, red)
         episode.add(replace(seen, truth=replace(seen.truth, ego=VehicleState(Pose(0, 0, 0), 0.0))))
-    metrics = episode.metrics([Infraction(InfractionKind.SIDEWALK, 1.0, 0, 0)])
+    metrics = episode.compute([Infraction(InfractionKind.SIDEWALK, 1.0, 0, 0)])
     assert json.loads(json_line(metrics)) == metrics
     assert metrics["reds_obeyed"] == 1
 
@@ -79,7 +79,7 @@ def test_a_blind_frame_is_no_right_answer() -> None:
     episode, true = EpisodeMetrics(), Affordances(hazard_stop=1.0)
     for k in range(10):
         episode.add(step(k / 10, UNKNOWN if k < 5 else replace(true, hazard_stop=0.0), true))
-    metrics = episode.metrics([])
+    metrics = episode.compute([])
     assert (metrics["error/hazard_stop"], metrics["error/relative_angle"]) == (1.0, 0.0)
 
 
@@ -87,6 +87,6 @@ def test_an_affordance_that_is_never_known_has_no_error_and_the_others_do() -> N
     episode, true = EpisodeMetrics(), Affordances()
     for k in range(10):
         episode.add(step(k / 10, replace(UNKNOWN, center_distance=0.5 if k % 2 else 0.1), true))
-    metrics = episode.metrics([])
+    metrics = episode.compute([])
     assert metrics["error/center_distance"] == pytest.approx(0.3)
     assert {name for name in metrics if name.startswith("error/")} == {"error/center_distance", "error/speed_sign"}

@@ -9,7 +9,7 @@ from typing import Any
 from caldrive.datatypes import Affordances, Control, Decision, Observation
 from caldrive.interfaces import BadImage, Controller, Perception, TruthSource
 
-UNKNOWN = Affordances(  # what an image tells that is no use
+UNKNOWN = Affordances(  # where an image is no use
     hazard_stop=math.nan, red_light=math.nan, speed_sign=None, vehicle_distance=math.nan, relative_angle=math.nan,
     center_distance=math.nan,
 )  # fmt: skip

@@ -39,7 +39,7 @@ class EpisodeMetrics:
         errors = affordance_errors(predicted, truth.affordances) if predicted else (math.nan,) * len(SPECS)
         self._errors.append(errors)
 
-    def metrics(self, infractions: Sequence[Infraction]) -> dict[str, Any]:
+    def compute(self, infractions: Sequence[Infraction]) -> dict[str, Any]:
         """All metrics by name.
 
         off_lane: share of the time in [0, 1]. reds_obeyed: how many red lights. error/NAME: of an affordance over the
@@ -71,7 +71,7 @@ def red_lights_obeyed(time: Column, red: Column, speed: Column, run_at: Sequence
         return 0
     approaches = np.split(steps, np.flatnonzero(np.diff(time[steps]) > SAME_LIGHT_GAP) + 1)
     starts = time[[approach[0] for approach in approaches]]
-    run = {int(np.searchsorted(starts, moment, side="right")) - 1 for moment in run_at}
+    run = {int(np.searchsorted(starts, seconds, side="right")) - 1 for seconds in run_at}
     return sum(k not in run and bool(speed[approach].min() < STANDING_SPEED) for k, approach in enumerate(approaches))
 
 

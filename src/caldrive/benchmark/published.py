@@ -1,4 +1,4 @@
-"""The paper's figures, for the columns beside ours: success (table 1) and kilometres between infractions (table 2)."""
+"""The paper's numbers, for the columns beside ours: success (table 1) and kilometres between infractions (table 2)."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def driver_provenance(driver: AgentSettings) -> dict[str, Any]:
 
 
 def suite_digest(path: Path) -> str:
-    """Tells a suite of one's own from any other: a digest of its file and of the maps that it drives in."""
+    """A digest of a suite of one's own: of its file, and of the maps that it drives in."""
     maps = sorted({trial.scenario.town for trial in from_json(path)} - set(TOWNS))
     content = b"".join(part.read_bytes() for part in (path, *map(Path, maps)))
     return hashlib.sha256(content).hexdigest()[:16]

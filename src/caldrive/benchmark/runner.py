@@ -63,7 +63,7 @@ def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
         result = run_episode(world, agent, trial.scenario, on_step=watch, referee=referee)
     except AgentError as error:
         raise AgentError(f"{error} (in episode {trial.key})") from error
-    figures = {name: plain(value) for name, value in metrics.metrics(result.infractions).items()}
+    figures = {name: plain(value) for name, value in metrics.compute(result.infractions).items()}
     line = {"key": trial.key, "result": result_values(result), "figures": figures}
     return EpisodeRecord(line=line, files=artifacts.files(trial.key, result), provenance=provenance)
 

@@ -1,4 +1,4 @@
-"""What `caldrive benchmark` can be told: one dataclass for Python, the command line and TOML files."""
+"""The options of `caldrive benchmark`: one dataclass for Python, the command line and TOML files."""
 
 from __future__ import annotations
 

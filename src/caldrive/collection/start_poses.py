@@ -104,7 +104,7 @@ def begin_episode(
     """The first observation, and the driver, ready."""
     cap = CAPS[0] if plan.tailgating else CAPS[int(rng.integers(len(CAPS)))]
     oracle = random_oracle(world.truth, config, plan.tailgating, rng)
-    # To whom no car is reported must not take one for nothing, however long the car stands there.
+    # A driver to whom no car is reported must not take the car before it for no hazard after a while.
     agent = CALAgent(oracle, CALController(ControlConfig(patience=PatienceConfig(enabled=False), cap=cap)))
     observation = world.reset(plan.scenario, route=plan.route, appearance=plan.appearance)
     if rng.random() < config.displaced:

@@ -22,7 +22,7 @@ SLOW, SPARE = 5 * KMH, 20.0  # m/s and s: the time limit where a world's map is 
 def chosen_scenarios(settings: EpisodeSettings, n: int) -> list[Scenario]:
     """n of the task's scenarios, from settings.route on, or the way from settings.start to settings.goal.
 
-    Raises ValueError for figures that cannot be, and for places away from any lane.
+    Raises ValueError for numbers that cannot be, and for places away from any lane.
     """
     _check(settings, n)
     chosen = [_own_scenario(settings)] * n if settings.start or settings.goal else _of_task(settings, n)

@@ -1,4 +1,4 @@
-"""What the commands can be told: plain data with a sentence on each field, which is also its help text."""
+"""The options of the commands that drive and measure: a sentence on each field, which is also its help text."""
 
 from __future__ import annotations
 
