@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Observation, Pose
-from caldrive.perception.network.config import BlockConfig, PerceptionConfig
+from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.recordings.writer import EpisodeWriter, Frame
 from caldrive.scenarios import Scenario
 
 HEIGHT, WIDTH = 32, 64
 SCENARIO = Scenario("town01", weather=1, start=Pose(0, 0, 0), goal=Pose(1, 2, 3), seed=7)
-TINY = PerceptionConfig(
+TINY = NetworkConfig(
     image_width=WIDTH,
     image_height=HEIGHT,
     width=1 / 8,
@@ -27,10 +27,10 @@ TINY = PerceptionConfig(
     center_distance=BlockConfig("dense", 8, 0.0),
 )
 SHORT = TrainingConfig(
-    steps=6, batch=4, window=3, warm_up=2, block_steps=0, evaluate_every=100, save_every=2, precision="fp32",
+    steps=6, batch=4, window=3, warm_up=2, history_steps=0, evaluate_every=100, save_every=2, precision="fp32",
     validation_share=0.3,
 )  # fmt: skip
-BLOCKS = replace(SHORT, block_steps=5, block_batch=8)
+HISTORY = replace(SHORT, history_steps=5, history_batch=8)  # with a second stage
 
 
 def column_image(center_distance: float, red: bool = False) -> Image:

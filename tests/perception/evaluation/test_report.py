@@ -8,16 +8,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from caldrive.affordances import SPECS
+from caldrive.affordances import BY_NAME
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import outputs_on
-from caldrive.perception.evaluation.report import WORST, errors, report, worst
+from caldrive.perception.evaluation.report import (
+    PUBLISHED,
+    WORST,
+    errors,
+    published_figures,
+    published_metrics,
+    report,
+    worst,
+)
 from caldrive.perception.network.network import Network
 from caldrive.recordings.folder import find_episodes
 from caldrive.recordings.writer import EpisodeWriter
 from tests.perception.data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame, record
 
-DISTANCE = next(spec for spec in SPECS if spec.name == "vehicle_distance")
+DISTANCE = BY_NAME["vehicle_distance"]
 AHEAD = (1.0, 4.0, 4.0, 8.0, 20.0, 30.0, 50.0, 50.0)
 
 
@@ -53,10 +61,10 @@ def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_
     assert set(found.groups["command"]) == {"left", "straight"}
 
 
-def test_the_worst_frames_are_of_moments_apart_whichever_camera_saw_them(tmp_path: Path) -> None:
+def test_the_worst_frames_are_of_times_apart_whichever_camera_saw_them(tmp_path: Path) -> None:
     frames = Frames(find_episodes(record(tmp_path, n_episodes=2, n_frames=80, n_cameras=2)), (HEIGHT, WIDTH))
     wrong = np.zeros(len(frames))
-    place = {(e, m, c): i for i, (e, m, c) in enumerate(_places(frames))}
+    place = {(e, t, c): i for i, (e, t, c) in enumerate(_places(frames))}
     for error, where in ((9, (0, 10, 0)), (8, (0, 10, 1)), (7, (0, 30, 1)), (6, (1, 10, 0)), (5, (0, 45, 1))):
         wrong[place[where]] = error
     chosen = worst(wrong, frames)
@@ -65,9 +73,9 @@ def test_the_worst_frames_are_of_moments_apart_whichever_camera_saw_them(tmp_pat
 
 
 def _places(frames: Frames) -> list[tuple[int, int, int]]:
-    """Episode, moment and camera of each frame."""
+    """Episode, time step and camera of each frame."""
     cameras = [episode.columns["camera"][row] for episode, row in map(frames.source, range(len(frames)))]
-    return [(int(e), int(m), int(c)) for e, m, c in zip(frames.episode, frames.moment, cameras, strict=True)]
+    return [(int(e), int(t), int(c)) for e, t, c in zip(frames.episode, frames.time_step, cameras, strict=True)]
 
 
 def test_the_worst_frames_are_drawn_with_what_was_seen_and_what_was_true(frames: Frames, tmp_path: Path) -> None:
@@ -89,3 +97,13 @@ def test_figures_are_told_apart_by_weather_and_town_and_classes_that_are_confuse
     seen, true = outputs["hazard_stop"].argmax(1), targets["hazard_stop"]
     wanted_counts = [[int(((true == t) & (seen == s)).sum()) for s in (0, 1)] for t in (0, 1)]
     assert found.confusion["hazard_stop"] == wanted_counts
+
+
+def test_the_papers_figures_stand_beside_a_networks_by_the_same_names(frames: Frames) -> None:
+    network = Network(TINY).eval()
+    overall = report(network, frames, network.features).overall
+    assert len(PUBLISHED) == len(published_metrics()) == len(published_figures()) == 6
+    assert (published_metrics().keys() | published_figures().keys()) <= overall.keys()
+    assert published_metrics()["vehicle_distance/mae_scaled"] == 0.03289
+    assert published_figures()["vehicle_distance/mae"] == pytest.approx(50 * 0.03289)
+    assert published_figures()["red_light/iou"] == published_metrics()["red_light/iou"] == 0.9395

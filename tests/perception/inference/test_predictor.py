@@ -15,7 +15,7 @@ from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.network.network import Network
 from caldrive.perception.targets import decode
-from caldrive.perception.training.multitask import Lessons
+from caldrive.perception.training.multitask import MultiTaskModel
 from caldrive.recordings.reader import read_episode
 from tests.perception.data import HEIGHT, TINY, WIDTH, column_image, record, see, values
 
@@ -31,7 +31,7 @@ def test_driving_gives_what_the_whole_episode_gives(network: Network, tmp_path: 
     episode = read_episode(path)
     batch = Frames([episode], (HEIGHT, WIDTH)).batch(np.array([0]), 14, network.span - 1)
     with torch.no_grad():
-        whole = Lessons(network)(normalise(to_float(batch.images)), batch.index, batch.command)
+        whole = MultiTaskModel(network)(normalise(to_float(batch.images)), batch.index, batch.command)
     perception = NetworkPerception(network, "fp32")
     for i, frame in enumerate(episode):
         found = perception.predict(Observation(frame.time, frame.image, frame.speed, frame.command))

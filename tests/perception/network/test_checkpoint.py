@@ -19,7 +19,7 @@ from caldrive.perception.network.checkpoint import (
     save_network,
     write_tensors,
 )
-from caldrive.perception.network.config import PERCEPTIONS, PerceptionConfig
+from caldrive.perception.network.config import NETWORKS, NetworkConfig
 from caldrive.perception.network.network import Network
 from tests.perception.data import TINY
 
@@ -53,8 +53,8 @@ def test_half_precision_halves_the_file_and_hardly_changes_the_outputs(network: 
 
 @pytest.mark.parametrize("preset", ["small", "paper"])
 def test_configurations_survive_a_dictionary(preset: str) -> None:
-    config = PERCEPTIONS[preset]
-    assert as_type(json.loads(json.dumps(asdict(config))), PerceptionConfig) == config
+    config = NETWORKS[preset]
+    assert as_type(json.loads(json.dumps(asdict(config))), NetworkConfig) == config
 
 
 def test_missing_damaged_and_foreign_files_are_told_apart(network: Network, tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_missing_damaged_and_foreign_files_are_told_apart(network: Network, tmp_
 
 
 def test_weights_of_another_network_are_refused(network: Network, tmp_path: Path) -> None:
-    save_network(tmp_path / "model.safetensors", network, CheckpointInfo(PERCEPTIONS["small"]))
+    save_network(tmp_path / "model.safetensors", network, CheckpointInfo(NETWORKS["small"]))
     with pytest.raises(CheckpointError, match=r"do not fit|cannot be read"):
         load_network(tmp_path / "model.safetensors")
 
@@ -120,7 +120,7 @@ def test_weights_that_are_not_numbers_are_refused(network: Network, tmp_path: Pa
 
 
 def test_variances_below_nothing_are_refused(tmp_path: Path) -> None:
-    network = Network(PERCEPTIONS["small"])
+    network = Network(NETWORKS["small"])
     network.get_buffer("backbone.norms.0.running_var")[0] = -1.0
     save_network(tmp_path / "model.safetensors", network, CheckpointInfo(network.config))
     with pytest.raises(CheckpointError, match="variances less than 0"):

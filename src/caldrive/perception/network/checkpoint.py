@@ -1,5 +1,7 @@
-"""A trained network on disk: one safetensors file, with all that belongs to it as JSON in its header. Nothing is
-unpickled."""
+"""A trained network on disk: one safetensors file, with all that belongs to it as JSON in its header.
+
+Nothing is unpickled, so a file from a stranger can do no harm.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +17,17 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from caldrive.affordances import SPECS, describe
+from caldrive.affordances import DISCRETE, describe
 from caldrive.files import as_type, read_json, write_whole
-from caldrive.perception.network.config import PerceptionConfig
+from caldrive.perception.network.config import NetworkConfig
 from caldrive.perception.network.network import Network
 
 FORMAT_VERSION = 2
-KEY = "caldrive"
+KEY = "caldrive"  # of the JSON in safetensors' metadata
 
 
 class DataSummary(TypedDict, total=False):
-    """What a checkpoint remembers of its data. train_classes: frames of each class by discrete affordance;
+    """What a checkpoint says of its data. train_classes: frames of each class by discrete affordance;
     validation_episodes: keys of those kept for validation."""
 
     train_frames: int
@@ -40,12 +42,13 @@ class CheckpointError(ValueError):
 
 @dataclass(frozen=True)
 class CheckpointInfo:
-    """What is known of a trained network: its configuration, its data, its validation metrics, how it was trained, and
-    the range of what enters each of its convolutions (empty where nobody looked).
+    """What is known of a trained network: its configuration, its data, its validation metrics, the settings of its
+    training, and the range of what enters each of its convolutions (empty where nobody looked).
 
-    The metrics are those in the precision of the training, not in the 8 bits in which it may drive."""
+    The metrics are those in the precision of the training, not in the 8 bits in which it may drive.
+    """
 
-    config: PerceptionConfig
+    config: NetworkConfig
     data: DataSummary = field(default_factory=DataSummary)
     metrics: dict[str, float] = field(default_factory=dict)
     training: dict[str, Any] = field(default_factory=dict)
@@ -76,9 +79,8 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     if header is None:
         raise CheckpointError(f"{path} holds tensors, but no network of caldrive: give a file made by `caldrive train`")
     if header.get("version") != FORMAT_VERSION:
-        found = header.get("version")
         raise CheckpointError(
-            f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: train the network anew"
+            f"{path} has format {header.get('version')}, this caldrive reads {FORMAT_VERSION}: train the network anew"
         )
     return tensors, header
 
@@ -112,11 +114,11 @@ def _read_network(path: Path) -> tuple[dict[str, Tensor], CheckpointInfo]:
         )
     if header.get("specs") != json.loads(json.dumps(describe())):
         raise CheckpointError(
-            f"{path} was trained for other affordances than this caldrive's six: train the network anew"
+            f"{path} was trained for other affordances than those of this caldrive: train the network anew"
         )
     try:
-        known = {f.name: header[f.name] for f in fields(CheckpointInfo) if f.name in header}
-        return tensors, as_type(known, CheckpointInfo)
+        values = {field.name: header[field.name] for field in fields(CheckpointInfo) if field.name in header}
+        return tensors, as_type(values, CheckpointInfo)
     except (KeyError, TypeError, ValueError) as error:
         raise CheckpointError(f"{path} has a header that cannot be read ({error}): train the network anew") from error
 
@@ -138,21 +140,21 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         raise CheckpointError(
             f"the weights in {path} do not fit its own configuration: train the network anew"
         ) from error
-    if wrong := _wrong(network, info):
-        raise CheckpointError(f"{path} has {wrong}: train the network anew")
+    if fault := _fault(network, info):
+        raise CheckpointError(f"{path} has {fault}: train the network anew")
     return network.eval(), info
 
 
-def _wrong(network: Network, info: CheckpointInfo) -> str:
+def _fault(network: Network, info: CheckpointInfo) -> str:
     """What is not as a training leaves it, or nothing."""
     state = network.state_dict()
     if not all(bool(value.isfinite().all()) for value in state.values()):
         return "weights that are not numbers"
     if any(bool((value < 0).any()) for name, value in state.items() if name.endswith("running_var")):
         return "variances less than 0"
-    if not all(0 < one < math.inf for one in info.ranges):
+    if not all(0 < size < math.inf for size in info.ranges):
         return "ranges of integers that are not more than 0"
-    outputs = {spec.name: spec.outputs for spec in SPECS if spec.discrete}
+    outputs = {spec.name: spec.outputs for spec in DISCRETE}
     counts = info.data.get("train_classes", {})
     if any(len(count) != outputs.get(name) or min(count) < 0 or not sum(count) for name, count in counts.items()):
         return "counts of other classes than this caldrive's"
