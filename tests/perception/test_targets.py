@@ -44,18 +44,18 @@ def perfect_outputs(targets: dict[str, Tensor]) -> dict[str, Tensor]:
 
 @given(affordances)
 def test_decoding_undoes_encoding(label: Affordances) -> None:
-    found = decode(perfect_outputs(encoded(label)))
-    assert found.speed_sign == label.speed_sign
+    decoded = decode(perfect_outputs(encoded(label)))
+    assert decoded.speed_sign == label.speed_sign
     for name in {spec.name for spec in SPECS} - {"speed_sign"}:
-        assert getattr(found, name) == pytest.approx(getattr(label, name), abs=1e-5)
+        assert getattr(decoded, name) == pytest.approx(getattr(label, name), abs=1e-5)
 
 
 def test_decoded_values_stay_in_their_ranges() -> None:
     outputs = perfect_outputs(encoded(Affordances()))
     outputs |= {spec.name: torch.tensor([[9.0]]) for spec in CONTINUOUS}
-    found = decode(outputs)
-    assert (found.vehicle_distance, found.center_distance) == (50.0, 2.0)
-    assert found.relative_angle == pytest.approx(math.pi)
+    decoded = decode(outputs)
+    assert (decoded.vehicle_distance, decoded.center_distance) == (50.0, 2.0)
+    assert decoded.relative_angle == pytest.approx(math.pi)
 
 
 def test_only_angle_and_center_distance_hang_on_the_command() -> None:
@@ -123,7 +123,7 @@ def test_mean_iou_counts_each_class_alike() -> None:
 def test_metrics_are_in_si_units_and_scaled() -> None:
     targets = encoded(Affordances(vehicle_distance=20.0))
     outputs = perfect_outputs(encoded(Affordances(vehicle_distance=25.0)))
-    found = metrics(outputs, targets)
-    assert found["vehicle_distance/mae"] == pytest.approx(5.0, abs=1e-4)
-    assert found["vehicle_distance/mae_scaled"] == pytest.approx(0.1, abs=1e-6)
-    assert found["speed_sign/iou"] == 1.0
+    figures = metrics(outputs, targets)
+    assert figures["vehicle_distance/mae"] == pytest.approx(5.0, abs=1e-4)
+    assert figures["vehicle_distance/mae_scaled"] == pytest.approx(0.1, abs=1e-6)
+    assert figures["speed_sign/iou"] == 1.0

@@ -36,8 +36,8 @@ def test_overlapping_windows_share_their_frames(frames: Frames) -> None:
     assert batch.index.tolist() == [[0, 1, 2, 3, 4, 5, 6], [2, 3, 4, 5, 6, 7, 8]]
     assert batch.group.tolist() == [0] * 7 + [1] * 2
     assert batch.targets["center_distance"].shape == (8,)
-    wanted = frames.column("center_distance")[[5, 6, 7, 8, 7, 8, 9, 10]] / 1.65
-    np.testing.assert_allclose(batch.targets["center_distance"].numpy(), wanted, rtol=1e-5)
+    expected = frames.column("center_distance")[[5, 6, 7, 8, 7, 8, 9, 10]] / 1.65
+    np.testing.assert_allclose(batch.targets["center_distance"].numpy(), expected, rtol=1e-5)
 
 
 def test_history_before_a_stream_is_its_first_frame(frames: Frames) -> None:
@@ -53,13 +53,13 @@ def test_images_from_memory_and_from_jpeg_are_the_same(folder: Path, frames: Fra
 
 def test_the_digest_depends_on_the_images(folder: Path) -> None:
     episodes = find_episodes(folder)
-    same, brighter = Frames(episodes, SIZE), replace(episodes[0], jpegs=[one + b"0" for one in episodes[0].jpegs])
+    same, brighter = Frames(episodes, SIZE), replace(episodes[0], jpegs=[jpeg + b"0" for jpeg in episodes[0].jpegs])
     assert Frames(find_episodes(folder), SIZE).digest == same.digest
     assert Frames([brighter, *episodes[1:]], SIZE).digest != same.digest
 
 
 def test_another_image_size_is_refused(folder: Path) -> None:
-    with pytest.raises(EpisodeError, match="64 x 32, the network takes 200 x 88"):
+    with pytest.raises(EpisodeError, match=r"images of 64 x 32 .* wanted 200 x 88"):
         Frames(find_episodes(folder), (88, 200), cache_gb=1.0)
 
 

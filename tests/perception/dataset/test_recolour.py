@@ -42,8 +42,8 @@ def test_every_class_has_its_rule_where_its_number_finds_it() -> None:
 
 def test_shadows_fall_on_ground_and_walls_and_on_nothing_that_moves_or_tells() -> None:
     images, semantics = scene(40)
-    found = recolour(images.clone(), semantics, torch.arange(40), Generator().manual_seed(0), SHADOWS)
-    changed = ((found - images).abs() > 0.02).float().mean(dim=(0, 1, 3))
+    after = recolour(images.clone(), semantics, torch.arange(40), Generator().manual_seed(0), SHADOWS)
+    changed = ((after - images).abs() > 0.02).float().mean(dim=(0, 1, 3))
     spared = [Semantic.SKY, Semantic.LIGHT, Semantic.SIGN, Semantic.VEHICLE, Semantic.PERSON]
     assert float(changed[[k for k in Semantic if k not in spared]].min()) > 0.2
     assert float(changed[spared].max()) == 0
@@ -69,8 +69,8 @@ def test_lights_and_signs_keep_their_colours_and_houses_do_not() -> None:
 
 def test_a_class_changes_by_one_rule_throughout_a_picture() -> None:
     plain = RecolourConfig(share=1.0, grain=0.0, plain=0.0, patches=0, shadows=0)
-    found, before = recoloured(plain, [0]), scene(1)[0]
-    factors = (found / before)[0, :, Semantic.ROAD]  # (3, W)
+    after, before = recoloured(plain, [0]), scene(1)[0]
+    factors = (after / before)[0, :, Semantic.ROAD]  # (3, W)
     assert float(factors.std(dim=1).max()) < 1e-3
 
 
@@ -78,19 +78,19 @@ def test_frames_of_one_window_get_the_same_colours() -> None:
     images, semantics = scene(1)
     same = images.repeat(4, 1, 1, 1).contiguous(memory_format=torch.channels_last)
     groups = torch.tensor([0, 0, 2, 2])
-    found = recolour(same, semantics.repeat(4, 0), groups, Generator().manual_seed(1), ALL)
-    assert torch.equal(found[0], found[1])
-    assert torch.equal(found[2], found[3])
-    assert not torch.equal(found[0], found[2])
+    after = recolour(same, semantics.repeat(4, 0), groups, Generator().manual_seed(1), ALL)
+    assert torch.equal(after[0], after[1])
+    assert torch.equal(after[2], after[3])
+    assert not torch.equal(after[0], after[2])
 
 
 def test_a_share_of_the_pictures_stays_as_it_is() -> None:
     images, _ = scene(200)
-    found = recoloured(RecolourConfig(share=0.3), list(range(200)))
-    kept = (found == images).flatten(1).all(dim=1).float().mean()
-    assert float(kept) == pytest.approx(0.7, abs=0.12)
-    assert float(found.min()) >= 0
-    assert float(found.max()) <= 1
+    after = recoloured(RecolourConfig(share=0.3), list(range(200)))
+    unchanged = (after == images).flatten(1).all(dim=1).float().mean()
+    assert float(unchanged) == pytest.approx(0.7, abs=0.12)
+    assert float(after.min()) >= 0
+    assert float(after.max()) <= 1
 
 
 def test_training_recolours_where_the_recording_has_semantic_images(tmp_path: Path) -> None:

@@ -41,24 +41,24 @@ def frames(tmp_path: Path) -> Frames:
 
 def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_yaw(frames: Frames) -> None:
     network = Network(TINY).eval()
-    found = report(network, frames, network.features)
-    assert found.frames == len(AHEAD)
-    cars = found.groups["car ahead"]
+    evaluation = report(network, frames, network.features)
+    assert evaluation.frames == len(AHEAD)
+    cars = evaluation.groups["car ahead"]
     assert list(cars) == ["00 to 03 m", "03 to 06 m", "06 to 12 m", "12 to 25 m", "25 to 50 m", "none"]
     weights = dict(zip(cars, (1, 2, 1, 1, 1, 2), strict=True))
     mean = sum(n * cars[name]["vehicle_distance/mae"] for name, n in weights.items()) / len(AHEAD)
-    assert mean == pytest.approx(found.overall["vehicle_distance/mae"], rel=1e-4)
+    assert mean == pytest.approx(evaluation.overall["vehicle_distance/mae"], rel=1e-4)
     wrong = errors(DISTANCE, *outputs_on(network, frames, network.features))
     assert cars["00 to 03 m"]["vehicle_distance/mae"] == pytest.approx(wrong[0], rel=1e-4)
     assert cars["25 to 50 m"]["vehicle_distance/mae"] == pytest.approx(wrong[5], rel=1e-4)
-    places = {name: row["vehicle_distance/mae"] for name, row in found.groups["place"].items()}
+    places = {name: row["vehicle_distance/mae"] for name, row in evaluation.groups["place"].items()}
     inside = np.array(frames.column("junction"))
     assert 0 < inside.sum() < len(inside)
-    wanted = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
-    assert places == pytest.approx(wanted, rel=1e-4)
-    turned = {name: row["vehicle_distance/mae"] for name, row in found.groups["camera turned"].items()}
+    expected = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
+    assert places == pytest.approx(expected, rel=1e-4)
+    turned = {name: row["vehicle_distance/mae"] for name, row in evaluation.groups["camera turned"].items()}
     assert turned == pytest.approx({"05 to 10 °": wrong[3:].mean(), "10 ° and more": wrong[:3].mean()}, rel=1e-4)
-    assert set(found.groups["command"]) == {"left", "straight"}
+    assert set(evaluation.groups["command"]) == {"left", "straight"}
 
 
 def test_the_worst_frames_are_of_times_apart_whichever_camera_saw_them(tmp_path: Path) -> None:
@@ -88,15 +88,15 @@ def test_figures_are_told_apart_by_weather_and_town_and_classes_that_are_confuse
     for number, (town, weather) in enumerate((("town01", 1), ("town01", 3), ("town02", 3))):
         record(tmp_path / str(number), n_episodes=1, scenario=replace(SCENARIO, town=town, weather=weather))
     frames, network = Frames(find_episodes(tmp_path), (HEIGHT, WIDTH)), Network(TINY).eval()
-    found = report(network, frames, network.features)
+    evaluation = report(network, frames, network.features)
     outputs, targets = outputs_on(network, frames, network.features)
     wrong = errors(DISTANCE, outputs, targets).reshape(3, -1).mean(axis=1)  # by episode
-    for kind, wanted in (("weather", {"1": wrong[0], "3": wrong[1:].mean()}), ("town", {"town01": wrong[:2].mean()})):
-        for value, error in wanted.items():
-            assert found.groups[kind][value]["vehicle_distance/mae"] == pytest.approx(error, rel=1e-4)
+    for kind, expected in (("weather", {"1": wrong[0], "3": wrong[1:].mean()}), ("town", {"town01": wrong[:2].mean()})):
+        for value, error in expected.items():
+            assert evaluation.groups[kind][value]["vehicle_distance/mae"] == pytest.approx(error, rel=1e-4)
     seen, true = outputs["hazard_stop"].argmax(1), targets["hazard_stop"]
-    wanted_counts = [[int(((true == t) & (seen == s)).sum()) for s in (0, 1)] for t in (0, 1)]
-    assert found.confusion["hazard_stop"] == wanted_counts
+    expected_counts = [[int(((true == t) & (seen == s)).sum()) for s in (0, 1)] for t in (0, 1)]
+    assert evaluation.confusion["hazard_stop"] == expected_counts
 
 
 def test_the_papers_figures_stand_beside_a_networks_by_the_same_names(frames: Frames) -> None:

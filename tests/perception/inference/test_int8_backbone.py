@@ -77,8 +77,8 @@ def test_integers_do_not_hide_weights_that_are_not_numbers(network: Network) -> 
 def test_openvino_tells_its_makers_nothing() -> None:
     module = "caldrive.perception.inference.openvino_engine"
     code = f"import sys, {module}; print([n for n in sys.modules if 'telemetry' in n])"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "[]"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
 
 
 def test_ranges_of_another_backbone_are_refused(network: Network) -> None:

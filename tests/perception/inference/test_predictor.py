@@ -34,9 +34,9 @@ def test_driving_gives_what_the_whole_episode_gives(network: Network, tmp_path: 
         whole = MultiTaskModel(network)(normalise(to_float(batch.images)), batch.index, batch.command)
     perception = NetworkPerception(network, "fp32")
     for i, frame in enumerate(episode):
-        found = perception.predict(Observation(frame.time, frame.image, frame.speed, frame.command))
-        wanted = decode({name: output[i : i + 1] for name, output in whole.items()})
-        assert values(found) == pytest.approx(values(wanted), abs=1e-4)
+        affordances = perception.predict(Observation(frame.time, frame.image, frame.speed, frame.command))
+        expected = decode({name: output[i : i + 1] for name, output in whole.items()})
+        assert values(affordances) == pytest.approx(values(expected), abs=1e-4)
 
 
 def test_each_frame_passes_the_backbone_once(network: Network) -> None:

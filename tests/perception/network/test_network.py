@@ -111,8 +111,8 @@ def test_in_a_mixed_batch_a_group_learns_from_its_own_samples_only() -> None:
     assert all(p.grad is None for p in block.groups[1].parameters())
     block.zero_grad()
     block(features[command[:, 0] == 0], command[command[:, 0] == 0]).sum().backward()
-    for found, wanted in zip(mixed, (p.grad for p in block.groups[0].parameters()), strict=True):
-        torch.testing.assert_close(found, wanted)
+    for gradient, expected in zip(mixed, (p.grad for p in block.groups[0].parameters()), strict=True):
+        torch.testing.assert_close(gradient, expected)
 
 
 def test_all_six_affordances_come_out_for_each_frame() -> None:
@@ -143,7 +143,7 @@ def test_foreign_imagenet_weights_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="missing"):
         Backbone(1.0).load_imagenet(path)
     save_file({"features.0.weight": torch.zeros(8, 3, 3, 3)}, path)
-    with pytest.raises(ValueError, match=r"features\.0\.weight of shape \(8, 3, 3, 3\)"):
+    with pytest.raises(ValueError, match=r"found features\.0\.weight of shape \(8, 3, 3, 3\)"):
         Backbone(1.0).load_imagenet(path)
     with pytest.raises(ValueError, match="type --preset paper"):
         Network(replace(TINY, width=0.25)).backbone.load_imagenet(path)
@@ -164,15 +164,15 @@ def alive_after_training(norm: Norm) -> float:
     """Share of a group's nodes that are ever above zero after steps like those of a training's beginning."""
     group = NodeGroup(BlockConfig("tconv", 64, 0.0, length=5, norm=norm), 1536, 1).train()
     optimizer = torch.optim.Adam(group.parameters(), 1e-3)
-    direction, seen = torch.randn(1536) / 1536**0.5, []
-    group.output.register_forward_pre_hook(lambda module, inputs: seen.append(inputs[0].detach()))
+    direction, hidden = torch.randn(1536) / 1536**0.5, []
+    group.output.register_forward_pre_hook(lambda module, inputs: hidden.append(inputs[0].detach()))
     for _ in range(60):
         features = torch.randn(32, 1, 1536).relu().expand(-1, 5, -1)
         loss = (group(features)[:, 0] - features[:, 0] @ direction - 0.5 * torch.randn(32)).abs().mean()
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-    return float((torch.stack(seen[-10:]).view(-1, 64, 3) > 0).any(0).any(1).float().mean())
+    return float((torch.stack(hidden[-10:]).view(-1, 64, 3) > 0).any(0).any(1).float().mean())
 
 
 def test_a_layer_norm_keeps_half_of_the_nodes_over_many_positive_features_alive() -> None:

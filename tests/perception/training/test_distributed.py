@@ -50,12 +50,12 @@ def test_two_processes_find_the_gradient_that_one_finds(tmp_path: Path) -> None:
     for process in processes:
         process.join(120)
     assert [process.exitcode for process in processes] == [0, 0]
-    one, two = (read_tensors(tmp_path / name / "state.safetensors")[0] for name in ("one", "two"))
-    moments = [name for name in one if name.endswith("exp_avg")]  # a tenth of the gradient
+    alone, together = (read_tensors(tmp_path / name / "state.safetensors")[0] for name in ("one", "two"))
+    moments = [name for name in alone if name.endswith("exp_avg")]  # a tenth of the gradient
     assert moments
     for name in moments:
-        assert torch.allclose(one[name], two[name], rtol=1e-3, atol=1e-5), name
-    assert max(float(one[name].abs().max()) for name in moments) > 1e-2
+        assert torch.allclose(alone[name], together[name], rtol=1e-3, atol=1e-5), name
+    assert max(float(alone[name].abs().max()) for name in moments) > 1e-2
 
 
 def test_one_process_is_a_group_of_its_own() -> None:

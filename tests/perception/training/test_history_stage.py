@@ -97,10 +97,10 @@ def test_a_finished_run_stays_as_it_is(folder: Path, tmp_path: Path, monkeypatch
 
 
 def test_features_of_another_run_are_not_taken_up(folder: Path, tmp_path: Path) -> None:
-    wanted = train(HISTORY, folder, tmp_path / "wanted", TINY)
+    expected = train(HISTORY, folder, tmp_path / "wanted", TINY)
     stale = {"features": torch.zeros(160, 256)}
     write_tensors(tmp_path / "again" / "features" / "0000.safetensors", stale, {"digest": "another"})
-    assert train(HISTORY, folder, tmp_path / "again", TINY).read_bytes() == wanted.read_bytes()
+    assert train(HISTORY, folder, tmp_path / "again", TINY).read_bytes() == expected.read_bytes()
 
 
 def test_the_digest_of_features_depends_on_all_that_makes_them(folder: Path, tmp_path: Path) -> None:
@@ -108,13 +108,13 @@ def test_the_digest_of_features_depends_on_all_that_makes_them(folder: Path, tmp
     frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
     fewer = Frames(find_episodes(folder)[1:], (HEIGHT, WIDTH))
     first, second = Network(TINY).backbone, Network(TINY).backbone
-    same = history_stage._digest(first, "int8", (1.0,), frames)
-    assert history_stage._digest(first, "int8", (1.0,), frames) == same
-    others = [
+    digest = history_stage._digest(first, "int8", (1.0,), frames)
+    assert history_stage._digest(first, "int8", (1.0,), frames) == digest
+    digests = [
         history_stage._digest(second, "int8", (1.0,), frames), history_stage._digest(first, "fp32", (1.0,), frames),
         history_stage._digest(first, "int8", (2.0,), frames), history_stage._digest(first, "int8", (1.0,), fewer),
     ]  # fmt: skip
-    assert len({same, *others}) == 5
+    assert len({digest, *digests}) == 5
 
 
 def test_a_kill_after_the_last_step_leaves_no_features(folder: Path, tmp_path: Path) -> None:
@@ -129,9 +129,9 @@ def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: P
     frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
     features = history_stage._features(frames, np.arange(len(frames)), backbone_engine("fp32", network, info))
     with torch.no_grad():
-        wanted = network.features(normalise(to_float(frames.images(np.arange(3)))))
+        expected = network.features(normalise(to_float(frames.images(np.arange(3)))))
     assert features.dtype == torch.float16
-    assert torch.allclose(features[:3].float(), wanted, rtol=2e-3, atol=1e-3)
+    assert torch.allclose(features[:3].float(), expected, rtol=2e-3, atol=1e-3)
 
 
 def test_a_loss_that_is_no_number_ends_with_a_sentence(

@@ -24,7 +24,7 @@ def test_a_run_may_begin_with_a_trained_network(folder: Path, tmp_path: Path) ->
     torch.testing.assert_close(before[bias], after[bias])
     first.unlink()  # what a run began with is needed no more once it has a state
     assert train(still, folder, tmp_path / "second", TINY) == second
-    with pytest.raises(CheckpointError, match="there is no checkpoint"):
+    with pytest.raises(CheckpointError, match="found no file"):
         train(still, folder, tmp_path / "again", TINY)
 
 

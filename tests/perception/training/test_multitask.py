@@ -2,11 +2,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from torch import Generator, Tensor
+from torch import Generator
 
 from caldrive.datatypes import Semantic
 from caldrive.perception.dataset.frames import Frames
@@ -98,12 +99,9 @@ def test_windows_give_what_single_frames_give(folder: Path) -> None:
     network = Network(TINY).eval()
     frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
 
-    def outputs(start: int, window: int) -> dict[str, Tensor]:
+    def outputs(start: int, window: int) -> Any:
         batch = frames.batch(frames.window_starts(1)[[start]], window, network.span - 1)
-        found: dict[str, Tensor] = MultiTaskModel(network)(
-            normalise(to_float(batch.images)), batch.index, batch.command
-        )
-        return found
+        return MultiTaskModel(network)(normalise(to_float(batch.images)), batch.index, batch.command)
 
     with torch.no_grad():
         together, alone = outputs(2, 5), outputs(5, 1)

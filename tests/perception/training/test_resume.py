@@ -31,11 +31,11 @@ def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) 
 
 
 def test_a_killed_run_on_semantic_images_resumes_to_the_same_weights(tmp_path: Path) -> None:
-    seen = record(tmp_path / "seen", semantic=True)
-    whole = train(SHORT, seen, tmp_path / "whole", TINY)
-    train(SHORT, seen, tmp_path / "killed", TINY, stop=lambda step: step == 3)
-    assert train(SHORT, seen, tmp_path / "killed", TINY).read_bytes() == whole.read_bytes()
-    train(SHORT, seen, tmp_path / "other", TINY, stop=lambda step: step == 2)
+    semantic = record(tmp_path / "seen", semantic=True)
+    whole = train(SHORT, semantic, tmp_path / "whole", TINY)
+    train(SHORT, semantic, tmp_path / "killed", TINY, stop=lambda step: step == 3)
+    assert train(SHORT, semantic, tmp_path / "killed", TINY).read_bytes() == whole.read_bytes()
+    train(SHORT, semantic, tmp_path / "other", TINY, stop=lambda step: step == 2)
     with pytest.raises(CheckpointError, match="other tasks"):
         train(SHORT, record(tmp_path / "unseen"), tmp_path / "other", TINY)
 
@@ -44,16 +44,16 @@ def test_a_run_is_not_taken_up_by_another_number_of_processes(folder: Path, tmp_
     train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 3)
     tensors, header = read_tensors(tmp_path / "state.safetensors")
     write_tensors(tmp_path / "state.safetensors", tensors, header | {"processes": 4})
-    with pytest.raises(CheckpointError, match="a run of 4 processes, found 1"):
+    with pytest.raises(CheckpointError, match="a run of 4 processes, wanted 1"):
         train(SHORT, folder, tmp_path, TINY)
 
 
 def test_what_the_weights_do_not_depend_on_may_change_under_way(folder: Path, tmp_path: Path) -> None:
     whole = train(SHORT, folder, tmp_path / "whole", TINY)
     train(SHORT, folder, tmp_path / "killed", TINY, stop=lambda step: step == 4)
-    other = replace(SHORT, save_every=3, evaluate_every=5, cache_gb=0.0)
-    found = (load_network(train(other, folder, tmp_path / "killed", TINY)), load_network(whole))
-    weights = [network.state_dict() for network, _ in found]
+    free = replace(SHORT, save_every=3, evaluate_every=5, cache_gb=0.0)
+    networks = (load_network(train(free, folder, tmp_path / "killed", TINY)), load_network(whole))
+    weights = [network.state_dict() for network, _ in networks]
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
 
 
@@ -77,21 +77,21 @@ def test_a_state_of_other_episodes_is_not_taken_up(folder: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "sentence"),
     [
         ({"step": -1}, "is damaged"),
         ({"step": 7}, "is damaged"),
         ({"step": None}, "is damaged"),
         ({"training": 3}, "is damaged"),
-        ({"kind": "network"}, "no training's state, but a network"),
+        ({"kind": "network"}, "a network, wanted a training's state"),
     ],
     ids=str,
 )
-def test_a_damaged_state_is_not_taken_up(change: dict[str, Any], said: str, folder: Path, tmp_path: Path) -> None:
+def test_a_damaged_state_is_not_taken_up(change: dict[str, Any], sentence: str, folder: Path, tmp_path: Path) -> None:
     train(SHORT, folder, tmp_path, TINY, stop=lambda step: step == 2)
     tensors, header = read_tensors(tmp_path / "state.safetensors")
     write_tensors(tmp_path / "state.safetensors", tensors, header | change)
-    with pytest.raises(CheckpointError, match=said):
+    with pytest.raises(CheckpointError, match=sentence):
         train(SHORT, folder, tmp_path, TINY)
 
 

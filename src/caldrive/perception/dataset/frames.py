@@ -121,7 +121,7 @@ class Frames:
         if image.shape[:2] != self.size:
             recorded, wanted = (f"{w} x {h}" for h, w in (image.shape[:2], self.size))
             raise EpisodeError(
-                f"{episode.path} has images of {recorded}, the network takes {wanted}: record at that size"
+                f"found images of {recorded} in {episode.path}, wanted {wanted} for the network: record at that size"
             )
         return image
 

@@ -40,7 +40,7 @@ def _fast_integers() -> str | None:
 def use_bf16(precision: str, device: str) -> bool:
     """Whether to compute in bfloat16; `auto` does where that is faster than fp32."""
     if precision not in ("auto", "fp32", "bf16"):
-        raise ValueError(f"found precision {precision!r}, wanted auto, fp32 or bf16 (integers are for driving only)")
+        raise ValueError(f"found precision {precision!r}, wanted auto, fp32 or bf16: type --precision auto")
     if precision != "auto":
         return precision == "bf16"
     return device != "cpu" or _bf16_is_faster()
@@ -61,7 +61,9 @@ def driving_precision(wanted: str, info: CheckpointInfo) -> str:
         raise ValueError(f"found precision {wanted!r}, wanted one of {', '.join(PRECISIONS)}: type --precision auto")
     if wanted in INTEGERS:
         if not info.ranges:
-            raise ValueError("found a network without the ranges that int8 needs: train it anew, or take fp32")
+            raise ValueError(
+                "found a network without the ranges that int8 needs: train it again, or type --precision fp32"
+            )
         return wanted
     integers = _fast_integers() if wanted == "auto" and info.ranges else None
     return integers or ("bf16" if use_bf16(wanted, "cpu") else "fp32")

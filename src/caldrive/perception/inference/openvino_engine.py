@@ -106,11 +106,11 @@ class Int8Backbone:
     ) -> None:
         if len(ranges) != len(backbone.convolutions()):
             raise ValueError(
-                f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network anew"
+                f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network again"
             )
         numbers = (torch.as_tensor(ranges), *backbone.state_dict().values())
         if not all(bool(tensor.isfinite().all()) for tensor in numbers):
-            raise ValueError("found weights that are not numbers, which integers would hide: train the network anew")
+            raise ValueError("found weights that are not numbers, wanted a trained network: train it again")
         image = ops.parameter([1, 3, *size], np.float32)
         self._request = compiled([_backbone_graph(image, backbone, ranges, bits)], image, threads)
 
@@ -155,7 +155,8 @@ class OpenVINOBlocks:
     def __init__(self, network: Network, threads: int) -> None:
         blocks = network.task_blocks()
         if unknown := {block.config.layer for block in blocks.values()} - set(LAYERS):
-            raise ValueError(f"found task blocks of {', '.join(sorted(unknown))}, wanted {' or '.join(LAYERS)}")
+            layers = ", ".join(sorted(unknown))
+            raise ValueError(f"found task blocks of {layers}, wanted {' or '.join(LAYERS)}: type --precision fp32")
         self._names = list(blocks)
         self._requests = [self._compiled(network, command, threads) for command in range(len(COMMANDS))]
 

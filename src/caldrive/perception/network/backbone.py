@@ -85,7 +85,9 @@ class Backbone(nn.Module):
                 shape = tuple(state[name].shape) if name in state else None
                 if shape != tuple(parameter.shape):
                     wanted = tuple(parameter.shape)
-                    raise ValueError(f"{path} has {name} of shape {shape}, VGG16 has {wanted}: give VGG16's state dict")
+                    raise ValueError(
+                        f"found {name} of shape {shape} in {path}, wanted VGG16's of {wanted}: give VGG16's state dict"
+                    )
                 parameter.data.copy_(state[name])
 
 
@@ -96,4 +98,7 @@ def _read_state(path: Path) -> dict[str, Tensor]:
             return state
         return load_file(path)
     except (OSError, EOFError, SafetensorError, UnpicklingError, RuntimeError) as error:
-        raise ValueError(f"{path} is missing or no state dict of tensors: give a .safetensors or .pth file") from error
+        raise ValueError(
+            f"found that {path} is missing or no state dict of tensors, wanted VGG16's: "
+            "give a .safetensors or .pth file"
+        ) from error

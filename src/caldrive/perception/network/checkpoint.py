@@ -67,7 +67,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Tensors and header of a file by `write_tensors`. Raises CheckpointError where it is missing, damaged or
     foreign."""
     if not path.is_file():
-        raise CheckpointError(f"there is no checkpoint {path}: look for the name, or make one with `caldrive train`")
+        raise CheckpointError(f"found no file {path}, wanted a network: check the name, or type caldrive train")
     content = path.read_bytes()
     try:
         tensors = load(content)
@@ -75,12 +75,16 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__") or {}
         header = read_json(metadata[KEY], dict[str, Any]) if KEY in metadata else None
     except (SafetensorError, ValueError, struct.error) as error:
-        raise CheckpointError(f"{path} is damaged or no safetensors file: copy it again or train anew") from error
+        raise CheckpointError(
+            f"found that {path} is damaged or no safetensors file, wanted a whole one: copy it again, or train again"
+        ) from error
     if header is None:
-        raise CheckpointError(f"{path} holds tensors, but no network of caldrive: give a file made by `caldrive train`")
+        raise CheckpointError(
+            f"found tensors in {path}, but no network of caldrive, wanted one: give a file made by caldrive train"
+        )
     if header.get("version") != FORMAT_VERSION:
         raise CheckpointError(
-            f"{path} has format {header.get('version')}, this caldrive reads {FORMAT_VERSION}: train the network anew"
+            f"found format {header.get('version')} in {path}, wanted {FORMAT_VERSION}: train the network again"
         )
     return tensors, header
 
@@ -110,17 +114,19 @@ def _read_network(path: Path) -> tuple[dict[str, Tensor], CheckpointInfo]:
     tensors, header = read_tensors(path)
     if header.get("kind") != "network":
         raise CheckpointError(
-            f"{path} is part of a training, no finished network: give the model.safetensors that it makes"
+            f"found part of a training in {path}, wanted a finished network: give its model.safetensors"
         )
     if header.get("specs") != json.loads(json.dumps(describe())):
         raise CheckpointError(
-            f"{path} was trained for other affordances than those of this caldrive: train the network anew"
+            f"found in {path} a network for other affordances, wanted those of this caldrive: train the network again"
         )
     try:
-        values = {field.name: header[field.name] for field in fields(CheckpointInfo) if field.name in header}
-        return tensors, as_type(values, CheckpointInfo)
+        names = {part.name for part in fields(CheckpointInfo)}
+        return tensors, as_type({name: header[name] for name in header.keys() & names}, CheckpointInfo)
     except (KeyError, TypeError, ValueError) as error:
-        raise CheckpointError(f"{path} has a header that cannot be read ({error}): train the network anew") from error
+        raise CheckpointError(
+            f"found in {path} a header that cannot be read ({error}), wanted a training's: train the network again"
+        ) from error
 
 
 def read_info(path: Path | str) -> CheckpointInfo:
@@ -138,10 +144,10 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise CheckpointError(
-            f"the weights in {path} do not fit its own configuration: train the network anew"
+            f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
         ) from error
     if fault := _fault(network, info):
-        raise CheckpointError(f"{path} has {fault}: train the network anew")
+        raise CheckpointError(f"found in {path} {fault}, wanted a trained network: train it again")
     return network.eval(), info
 
 

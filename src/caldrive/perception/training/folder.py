@@ -54,7 +54,8 @@ class TrainingFolder:
             return [row for row in map(_row, lines) if row["step"] <= step]
         except ValueError as error:
             raise CheckpointError(
-                f"{self.metrics} is damaged ({error}): remove the folder, or give another --out"
+                f"found that {self.metrics} is damaged ({error}), wanted a row of metrics a step: "
+                "remove the folder, or give another --out"
             ) from error
 
     def add(self, row: Row) -> None:

@@ -32,7 +32,9 @@ def _cached_imagenet() -> Path:
     folder = Path(torch.hub.get_dir()) / "checkpoints"
     files = sorted(folder.glob("vgg16-*.pth"))
     if not files:
-        raise ValueError(f"found no vgg16-*.pth in {folder}: put VGG16's state dict there, or type --imagenet FILE")
+        raise ValueError(
+            f"found no vgg16-*.pth in {folder}, wanted VGG16's state dict: put it there, or type --imagenet FILE"
+        )
     return files[0]
 
 
@@ -54,7 +56,10 @@ def _from_trained(path: str, wanted: NetworkConfig) -> Network:
     trained, info = load_network(path)
     blocks = {spec.name: getattr(wanted, spec.name) for spec in SPECS}
     if replace(info.config, **blocks) != wanted:
-        raise CheckpointError(f"{path} is a network of another width or image size than wanted: give its --preset")
+        raise CheckpointError(
+            f"found in {path} a network of another width or image size, wanted one like that which is trained: "
+            "type its --preset"
+        )
     network, trained = Network(wanted), uncalibrated(trained, info.data.get("train_classes", {}))
     network.backbone.load_state_dict(trained.backbone.state_dict())
     for name in blocks.keys() - set(different_blocks(info.config, wanted)):

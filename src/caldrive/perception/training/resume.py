@@ -47,18 +47,20 @@ def restore_state(path: Path, run: TrainingRun) -> None:
     another run."""
     tensors, values = read_tensors(path)
     if values.get("kind") != KIND:
-        raise CheckpointError(f"{path} is no training's state, but a {values.get('kind')}: give another --out")
+        raise CheckpointError(f"found in {path} a {values.get('kind')}, wanted a training's state: give another --out")
     try:
         header = as_type(values, Header)
         if difference := _difference(run, tensors, header):
-            raise CheckpointError(f"{path} belongs to a run {difference}")
+            raise CheckpointError(f"found in {path} a run {difference}")
         if not 0 <= header["step"] <= run.config.steps:
             raise ValueError(f"step {header['step']} of {run.config.steps}")
         _restore(run, tensors, header)
     except CheckpointError:
         raise
     except (KeyError, ValueError, TypeError, RuntimeError) as error:
-        raise CheckpointError(f"{path} is damaged ({error}): remove it and train anew") from error
+        raise CheckpointError(
+            f"found that {path} is damaged ({error}), wanted a training's state: remove it, and train again"
+        ) from error
 
 
 def _difference(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> str:
@@ -66,16 +68,16 @@ def _difference(run: TrainingRun, tensors: dict[str, Tensor], header: Header) ->
     saved = _decisive(header["training"], header["network"])
     for name, wanted in _decisive(asdict(run.config), asdict(run.network.config)).items():
         if saved.get(name) != wanted:
-            return f"with {name} {saved.get(name)}, wanted {wanted}: give another --out"
+            return f"with {name} {saved.get(name)}, wanted {wanted}: type the same settings, or another --out"
     if _without_prefix(MODEL, tensors).keys() != run.model.state_dict().keys():
         return (
-            "with other tasks, as on a recording with or without semantic images: "
-            "give the --data that it began with, or another --out"
+            "with other tasks, wanted the same, with or without semantic images: type the --data that it began with, "
+            "or another --out"
         )
     if header["episodes"] != run.sampler.frames.digest:
-        return "on other episodes: give the --data that it began with, or another --out"
+        return "on other episodes, wanted the same: type the --data that it began with, or another --out"
     if header["processes"] != run.group.size:
-        return f"of {header['processes']} processes, found {run.group.size}: start as many"
+        return f"of {header['processes']} processes, wanted {run.group.size}: start as many"
     return ""
 
 

@@ -31,7 +31,7 @@ from caldrive.perception.training.multitask import (
     segmentation_loss,
 )
 
-SEED_STRIDE = 1_000_003  # a prime: the seeds of the steps of two runs do not meet
+SEED_STRIDE = 1_000_003  # more than the steps of a run, so that the steps of two runs have different seeds
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
