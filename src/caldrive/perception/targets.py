@@ -49,10 +49,10 @@ def decode(outputs: Outputs) -> Affordances:
     values: dict[str, Any] = {}
     for spec in SPECS:
         output = outputs[spec.name]
-        if spec.outputs > 2:
-            values[spec.name] = spec.classes[int(output[0].argmax())] or None
-        elif spec.discrete:
+        if spec.binary:
             values[spec.name] = float(output[0].float().softmax(0)[1])
+        elif spec.discrete:
+            values[spec.name] = spec.classes[int(output[0].argmax())] or None
         else:
             values[spec.name] = float(si_values(spec, output)[0])
     return Affordances(**values)

@@ -21,7 +21,7 @@ F = 12
 
 @pytest.fixture(autouse=True)
 def _same_weights() -> None:
-    """Drawn anew for each run, six ReLUs are all off once in 64 runs."""
+    """Drawn differently in each run, six ReLUs are all off once in 64 runs."""
     torch.manual_seed(0)
 
 
@@ -161,7 +161,7 @@ def test_imagenet_weights_are_read_as_torch_hub_keeps_them_and_nothing_else_is_u
 
 
 def alive_after_training(norm: Norm) -> float:
-    """Share of a group's nodes that are ever above zero after steps like those of a training's beginning."""
+    """Share of a group's nodes that are ever above zero after steps like the first ones of a training."""
     group = NodeGroup(BlockConfig("tconv", 64, 0.0, length=5, norm=norm), 1536, 1).train()
     optimizer = torch.optim.Adam(group.parameters(), 1e-3)
     direction, hidden = torch.randn(1536) / 1536**0.5, []

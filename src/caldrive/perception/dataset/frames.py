@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from caldrive.affordances import CONDITIONAL, SPECS
-from caldrive.datatypes import Command
+from caldrive.perception.network.network import COMMANDS
 from caldrive.perception.targets import encode
 from caldrive.recordings.folder import joined
 from caldrive.recordings.reader import Episode
 from caldrive.recordings.writer import EpisodeError
 
 Ids = NDArray[np.int64]  # numbers of frames
-COMMAND_NUMBERS = {command.value: number for number, command in enumerate(Command)}
+COMMAND_NUMBERS = {command.value: number for number, command in enumerate(COMMANDS)}
 NO_COMMAND = -1
 
 
