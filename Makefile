@@ -36,8 +36,9 @@ model: $(READY)
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
-# The suites for both agents, and in docs/results their reports and every episode's line, from which the tables follow
-# again; a run that was stopped goes on. An episode that one suite shares with another is driven once.
+# The suites for both agents, and in docs/results the report's tables and every episode's line (compressed), from which
+# the tables follow again; the HTML report stays in out/results. A run that was stopped goes on. An episode that one
+# suite shares with another is driven once.
 results: $(READY)
 	@for agent in oracle cal; do \
 		known=(); \
@@ -48,10 +49,12 @@ results: $(READY)
 		done; \
 	done
 	@for suite in corl2017 nocrash traffic-school; do \
-		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out docs/results/$$suite; \
+		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out $(RESULTS)/$$suite; \
+		mkdir -p docs/results/$$suite/{oracle,cal}; \
+		cp $(RESULTS)/$$suite/report.md docs/results/$$suite; \
 		for agent in oracle cal; do \
-			mkdir -p docs/results/$$suite/$$agent; \
-			cp $(RESULTS)/$$suite/$$agent/{run.json,results.jsonl} docs/results/$$suite/$$agent; \
+			cp $(RESULTS)/$$suite/$$agent/run.json docs/results/$$suite/$$agent; \
+			gzip -9nc $(RESULTS)/$$suite/$$agent/results.jsonl > docs/results/$$suite/$$agent/results.jsonl.gz; \
 		done; \
 	done
 
