@@ -94,7 +94,9 @@ def _from_file(path: Path, option: str) -> ModuleType:
     path = path.resolve()
     if not path.is_file():
         raise ValueError(f"found no file {path}, wanted Python code: type {option} FILE.py:CLASS")
-    name = f"caldrive_plugin_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}_{path.stem}"
+    # A file that has changed since is another module: what is driven is what its digest says.
+    content = str(path).encode() + path.read_bytes()
+    name = f"caldrive_plugin_{hashlib.sha256(content).hexdigest()[:8]}_{path.stem}"
     if name in sys.modules:
         return sys.modules[name]
     spec = spec_from_file_location(name, path)

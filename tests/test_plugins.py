@@ -1,0 +1,103 @@
+"""Other people's classes: found by file, module or entry point, and named where they are no use."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+from caldrive import plugins
+from caldrive.plugins import from_entry_point, full_name, load_plugin, short_name
+
+CODE = """
+from dataclasses import dataclass
+
+@dataclass
+class Driver:
+    cap: float = 1.0
+
+class Broken:
+    def __init__(self):
+        raise KeyError("engine")
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "own.py").write_text(CODE)
+    return tmp_path / "own.py"
+
+
+def test_a_class_in_a_file_is_made_with_what_it_takes(file: Path) -> None:
+    plugin = load_plugin(f"{file}:Driver", "--agent")
+    assert plugin.build(cap=3.0, dt=0.1).cap == 3.0
+    assert plugin.takes("cap")
+    assert not plugin.takes("dt")
+
+
+def test_a_file_is_loaded_once_and_leaves_the_path_as_it_was(file: Path) -> None:
+    before = list(sys.path)
+    first, second = (load_plugin(f"{file}:Driver", "--agent") for _ in range(2))
+    assert first.make is second.make
+    assert sys.path == before
+
+
+def test_a_files_neighbours_can_be_imported(file: Path) -> None:
+    (file.parent / "neighbour_of_own.py").write_text("CAP = 7.0")
+    (file.parent / "other.py").write_text("from neighbour_of_own import CAP\nclass Driver:\n    cap = CAP\n")
+    assert load_plugin(f"{file.parent / 'other.py'}:Driver", "--agent").build().cap == 7.0
+
+
+def test_a_class_of_a_module_is_found() -> None:
+    assert load_plugin("fractions:Fraction", "--agent").build() == 0
+
+
+def test_what_an_installed_package_offers_is_found_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = EntryPoint("half", "fractions:Fraction", "caldrive.agents")
+    monkeypatch.setattr(plugins, "entry_points", lambda group, name: [entry] if name == "half" else [])
+    found = from_entry_point("caldrive.agents", "half")
+    assert found is not None
+    assert found.name == "Fraction"
+    assert from_entry_point("caldrive.agents", "third") is None
+
+
+def test_another_text_of_the_file_is_another_source(file: Path) -> None:
+    first = load_plugin(f"{file}:Driver", "--agent").source
+    assert load_plugin(f"{file}:Broken", "--agent").source == first
+    file.write_text(CODE.replace("1.0", "2.0"))
+    changed = load_plugin(f"{file}:Driver", "--agent")
+    assert changed.source != first
+    assert changed.build().cap == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{file}:Nobody", r"found no class 'Nobody' in .*own\.py, wanted one of .*Driver.*type --agent"),
+        ("{file}/none.py:Driver", "found no file .*type --agent FILE.py:CLASS"),
+        ("no_such_module_here:Driver", "found no module 'no_such_module_here'"),
+    ],
+)
+def test_what_is_not_there_is_named(text: str, message: str, file: Path) -> None:
+    with pytest.raises(ValueError, match=message):
+        load_plugin(text.format(file=file), "--agent")
+
+
+def test_code_that_fails_is_named_with_its_line(file: Path) -> None:
+    with pytest.raises(ValueError, match=r"Broken cannot be made \(KeyError: 'engine', own\.py line \d+\)"):
+        load_plugin(f"{file}:Broken", "--agent").build()
+    (file.parent / "bad.py").write_text("x = 1\ny = x +\n")
+    with pytest.raises(ValueError, match=r"bad\.py cannot be loaded \(SyntaxError"):
+        load_plugin(f"{file.parent / 'bad.py'}:Driver", "--agent")
+
+
+def test_names_are_the_same_in_every_folder_and_short_in_tables(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(file.parent)
+    assert full_name("own.py:Driver") == f"{file}:Driver"
+    assert full_name("laws.toml") == str(file.parent / "laws.toml")
+    assert [full_name(name) for name in ("oracle", "package.module:Class")] == ["oracle", "package.module:Class"]
+    assert [short_name(name) for name in ("oracle", f"{file}:Driver", "/a/laws.toml")] == [
+        "oracle", "Driver", "laws.toml"
+    ]  # fmt: skip
