@@ -71,7 +71,7 @@ AWAY = [2.0, 4.0, 6.0, 8.0, 8.0, 8.0, 8.0, 8.0]
 def test_a_red_light_is_obeyed_where_the_car_stood_before_it_and_did_not_run_it(
     red: list[int], speed: list[float], run: list[float], obeyed: int
 ) -> None:
-    time = np.arange(len(red)) * 0.5
+    time = np.arange(len(red), dtype=np.float64) * 0.5
     assert reds_obeyed(time, np.array(red, float), np.array(speed), run) == obeyed
 
 

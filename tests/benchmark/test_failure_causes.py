@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from caldrive.benchmark.failure_causes import cause, common_places
 from tests.benchmark.traces import after, trace
 
@@ -19,7 +21,7 @@ def test_a_car_that_leaves_its_lane_says_what_it_did_not_see() -> None:
 
 
 def test_a_car_that_stands_for_nothing_says_what_it_saw() -> None:
-    still = {"speed": after(300, 0.0, before=5.0), "predicted_hazard_stop": after(300, 0.7)}
+    still: dict[str, Any] = {"speed": after(300, 0.0, before=5.0), "predicted_hazard_stop": after(300, 0.7)}
     found = cause(trace(state=after(300, "hazard stop", before="cruising"), **still))
     assert (found.what, found.x) == ("stood before no hazard", 150.0)
     assert found.seen == "hazard stop seen with 0.70"
@@ -28,7 +30,7 @@ def test_a_car_that_stands_for_nothing_says_what_it_saw() -> None:
 
 
 def test_a_stop_that_is_right_or_short_is_no_cause() -> None:
-    stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
+    stop: dict[str, Any] = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
     assert cause(trace(true_hazard_stop=after(300, 1.0), **stop)).what == "was too slow"
     short = [5.0] * 300 + [0.0] * 90 + [5.0] * 210
     assert cause(trace(state="hazard stop", speed=short)).seen == "stood for 15 % of the time"
@@ -44,12 +46,12 @@ def test_a_stop_that_flickers_is_one_and_short_ones_are_none() -> None:
 def test_a_car_that_comes_back_to_its_lane_at_once_is_none_that_left_it() -> None:
     wide = [0.0] * 200 + [1.5] * 25 + [0.0] * 375
     assert cause(trace(true_center_distance=wide)).what == "was too slow"
-    stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
+    stop: dict[str, Any] = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
     assert cause(trace(true_center_distance=wide, **stop)).what == "stood before no hazard"
 
 
 def test_what_came_first_counts() -> None:
-    stop = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
+    stop: dict[str, Any] = {"state": after(300, "hazard stop", before="cruising"), "speed": after(300, 0.0, before=5.0)}
     assert cause(trace(true_center_distance=after(250, 2.0), **stop)).what == "left its lane"
     assert cause(trace(true_center_distance=after(350, 2.0), **stop)).what == "stood before no hazard"
 

@@ -18,7 +18,7 @@ SCENARIO = Scenario("town01", 1, Pose(0, 0, 0), Pose(1, 0, 0), task="one-turn")
 
 
 def driven(
-    outcome: Outcome = Outcome.SUCCESS, broken: tuple[InfractionKind, ...] = (), done: float = 500.0, **change: str
+    outcome: Outcome = Outcome.SUCCESS, broken: tuple[InfractionKind, ...] = (), done: float = 500.0, **change: Any
 ) -> Driven:
     result = EpisodeResult(
         replace(SCENARIO, **change), outcome, 60.0, 500.0, done, 1000.0, tuple(Infraction(k, 1.0, 0, 0) for k in broken)

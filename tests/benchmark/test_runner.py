@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+from collections.abc import Generator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -48,6 +49,7 @@ def lines(settings: BenchmarkSettings) -> list[bytes]:
 def test_a_run_broken_off_goes_on_to_the_same_results(whole: BenchmarkSettings, tmp_path: Path) -> None:
     broken = replace(whole, out=tmp_path)
     run = benchmark(broken)
+    assert isinstance(run, Generator)
     next(run)
     run.close()
     with (tmp_path / "results.jsonl").open("ab") as file:  # as if killed while writing

@@ -13,12 +13,12 @@ import pytest
 from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.perturbation import HiddenCars, Tailgater
-from caldrive.collection.recorder import BASELINES, episode_path, record_episode
+from caldrive.collection.recorder import BASELINES, record_episode
 from caldrive.collection.start_poses import Plan, begin_episode, plan_episode
 from caldrive.control.controller import CALController
 from caldrive.datatypes import CameraConfig, Semantic
 from caldrive.recordings.reader import Episode, read_episode
-from caldrive.recordings.writer import EpisodeError
+from caldrive.recordings.writer import EpisodeError, episode_path
 from caldrive.world.embedded import EmbeddedWorld
 
 TINY = CollectConfig("town02", (1, 6), duration=2.0, cars=6, people=10, tailgating=0.0, width=48, height=24, seed=4)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,7 +90,8 @@ def test_the_relative_angle_may_count_more_than_the_others() -> None:
     [("vehicle_distance", 50.0), ("center_distance", 2.0), ("center_distance", -2.0), ("relative_angle", -math.pi)],
 )
 def test_an_output_beyond_a_limit_is_right_where_the_truth_is_at_it(name: str, limit: float) -> None:
-    at_limit, within = encoded(Affordances(**{name: limit})), encoded(Affordances(**{name: limit / 2}))
+    whole, half = dict[str, Any]({name: limit}), dict[str, Any]({name: limit / 2})
+    at_limit, within = encoded(Affordances(**whole)), encoded(Affordances(**half))
     for targets, wrong_by in ((at_limit, 0.0), (within, 0.3)):
         beyond = losses({name: perfect_outputs(targets)[name] + math.copysign(0.3, limit)}, targets)[name]
         assert float(beyond) == pytest.approx(wrong_by, abs=1e-6)

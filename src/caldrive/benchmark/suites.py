@@ -13,7 +13,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
-from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, scenarios
+from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, task_scenarios
 from caldrive.files import read_json
 from caldrive.results import EpisodeResult, InfractionKind
 from caldrive.scenarios import Scenario, scenario_from_values, scenario_values
@@ -94,7 +94,7 @@ def _seed(seed: int, weather: int) -> int:
 def _corl2017(seed: int, time_limit: str, routes: int) -> Iterator[Trial]:
     for condition, town, weather in _by_weather():
         for task in TASKS:
-            found = scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)
+            found = task_scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)
             for k, scenario in enumerate(found[:routes]):
                 yield Trial(f"{town}-w{weather:02d}-{task}-{k:02d}", condition, scenario)
 
@@ -117,7 +117,7 @@ def _nocrash(seed: int, time_limit: str, fatal: tuple[InfractionKind, ...]) -> I
     for condition, town, weather in _by_weather():
         for density, traffic in DENSITIES.items():
             cars, people = traffic[town]
-            found = scenarios(
+            found = task_scenarios(
                 town, "navigation", weather, cars=cars, people=people, seed=_seed(seed, weather), time_limit=time_limit,
                 name=density,
             )  # fmt: skip

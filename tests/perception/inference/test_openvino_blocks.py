@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import torch
@@ -29,10 +30,12 @@ TESTED = ("hazard_stop", "relative_angle")  # one that is conditional
 def made(block: BlockConfig) -> Network:
     """A network whose norms have seen something, with this block for a few affordances."""
     torch.manual_seed(0)
-    blocks = {spec.name: block if spec.name in TESTED else BlockConfig("dense", 4) for spec in SPECS}
+    blocks: dict[str, Any] = {spec.name: block if spec.name in TESTED else BlockConfig("dense", 4) for spec in SPECS}
     network = Network(replace(TINY, **blocks))
     for module in network.modules():
         if isinstance(module, nn.BatchNorm1d):
+            assert module.running_mean is not None
+            assert module.running_var is not None
             nn.init.uniform_(module.running_mean, -1, 1)
             nn.init.uniform_(module.running_var, 0.5, 2)
         if isinstance(module, nn.BatchNorm1d | nn.LayerNorm):

@@ -36,7 +36,7 @@ def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path
     long = replace(BLOCKS, block_steps=60, learning_rate=3e-3, augment=False)
     before = load_network(train(replace(long, block_steps=0), folder, tmp_path / "before", TINY))[0]
     after, info = load_network(train(long, folder, tmp_path / "after", TINY))
-    rows = [json.loads(line) for line in (tmp_path / "after" / "metrics.jsonl").open()]
+    rows = [json.loads(line) for line in (tmp_path / "after" / "metrics.jsonl").read_text().splitlines()]
     assert [row["step"] for row in rows] == list(range(1, 67))
     assert np.mean([row["loss"] for row in rows[-10:]]) < 0.8 * np.mean([row["loss"] for row in rows[6:16]])
     assert rows[-1]["validation/loss"] == info.metrics["loss"]
@@ -56,7 +56,7 @@ def test_only_blocks_that_look_back_change(folder: Path, tmp_path: Path) -> None
 
 
 def test_without_a_block_that_looks_back_there_is_no_such_lesson(folder: Path, tmp_path: Path) -> None:
-    now = {spec.name: BlockConfig("dense", 8) for spec in SPECS}
+    now: dict[str, Any] = {spec.name: BlockConfig("dense", 8) for spec in SPECS}
     train(BLOCKS, folder, tmp_path, replace(TINY, **now))
     assert len((tmp_path / "metrics.jsonl").read_text().splitlines()) == BLOCKS.steps
 
@@ -77,7 +77,7 @@ def test_a_run_killed_while_the_blocks_learn_resumes_to_the_same_network(
 ) -> None:
     whole = train(BLOCKS, folder, tmp_path / "whole", TINY)
     monkeypatch.setattr(blocks, "CHUNK", 50)
-    right, calls = getattr(blocks, place), []
+    right, calls = getattr(blocks, place), list[None]()
 
     def killed(*arguments: Any) -> Any:
         calls.append(None)

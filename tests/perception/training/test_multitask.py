@@ -12,7 +12,7 @@ from caldrive.perception.dataset.recolour import FREEDOM
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.perception.training.distributed import Team
 from caldrive.perception.training.multitask import CELL, STAGE, Segmentation, segmentation_loss
-from caldrive.perception.training.train import start
+from caldrive.perception.training.run import start
 from caldrive.recordings.folder import find_episodes
 from tests.perception.data import HEIGHT, TINY, WIDTH, record
 
@@ -48,7 +48,7 @@ def test_the_lesson_is_given_where_there_are_semantic_images(tmp_path: Path) -> 
     assert run.lessons.segmentation is not None
     outputs = run.lessons(torch.randn(2, 3, HEIGHT, WIDTH), torch.tensor([[0], [1]]), torch.zeros(2, 1).long())
     semantics = np.zeros((2, HEIGHT, WIDTH), np.uint8)
-    segmentation_loss(outputs["segmentation"], semantics, Generator()).backward()  # type: ignore[no-untyped-call]
+    segmentation_loss(outputs["segmentation"], semantics, Generator()).backward()
     learning = [conv.weight.grad is not None for conv in run.network.backbone.convolutions()]
     assert learning == [True] * 10 + [False] * 3  # the last stage lies behind the head
     before = run.lessons.segmentation.head.weight.clone()

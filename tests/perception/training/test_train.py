@@ -54,7 +54,8 @@ def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) 
     assert read_tensors(tmp_path / "killed" / "state.safetensors")[1]["step"] == 2
     resumed = train(SHORT, folder, tmp_path / "killed", TINY)
     assert resumed.read_bytes() == whole.read_bytes()
-    rows = [[json.loads(line) for line in (p.parent / "metrics.jsonl").open()] for p in (whole, resumed)]
+    files = [model.parent / "metrics.jsonl" for model in (whole, resumed)]
+    rows = [[json.loads(line) for line in file.read_text().splitlines()] for file in files]
     assert [r["loss"] for r in rows[0]] == [r["loss"] for r in rows[1]]
     assert [r["step"] for r in rows[1]] == [1, 2, 3, 4, 5, 6]
 
@@ -77,7 +78,7 @@ def test_frames_in_parts_give_the_gradient_of_all_at_once(segmentation: bool) ->
     for at_once in (None, 3):
         lessons = Lessons(network, head, at_once).eval()
         lessons.zero_grad()
-        sum(output.square().mean() for output in lessons(images, index, command).values()).backward()  # type: ignore[union-attr]
+        sum(output.square().mean() for output in lessons(images, index, command).values()).backward()
         found.append([p.grad.clone() for p in lessons.parameters() if p.grad is not None])
     for whole, parts in zip(*found, strict=True):
         torch.testing.assert_close(whole, parts, rtol=1e-4, atol=1e-6)
@@ -230,7 +231,7 @@ def test_damaged_metrics_are_named(folder: Path, tmp_path: Path) -> None:
 
 def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, tmp_path: Path) -> None:
     model = train(replace(SHORT, evaluate_every=3), folder, tmp_path, TINY)
-    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").open()]
+    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
     assert [row["step"] for row in rows if "validation/loss" in row] == [3, 6]
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
     network, info = load_network(model)
