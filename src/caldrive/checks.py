@@ -1,4 +1,4 @@
-"""What an option's number may be, looked at before the work begins."""
+"""What an option may be, checked before the work begins, so that an hour's drive does not end at a locked door."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def require_within(option: str, value: float, low: float, high: float, usual: fl
 
 def require_writable_folder(folder: Path, option: str = "--out") -> None:
     """Raises OSError where the folder neither is there to be written to nor can be made. option: what named it."""
-    nearest = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists())
+    nearest = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not nearest.is_dir():
         raise OSError(f"found that {nearest} is a file, wanted a folder to write to: give another {option}")
     if not os.access(nearest, os.W_OK | os.X_OK):
@@ -33,8 +33,8 @@ def require_writable_file(path: Path, option: str, ending: str) -> None:
     """Raises ValueError where the name has another ending, by which a picture could take a recording's place, OSError
     where a file cannot be written under it. option: what named it."""
     if path.suffix.lower() != ending:
-        said = f"{option} {path.with_suffix(ending) if path.name else path / f'NAME{ending}'}"
-        raise ValueError(f"found {option} {path}, wanted a name that ends in {ending}: type {said}")
+        better = path.with_suffix(ending) if path.name else path / f"NAME{ending}"
+        raise ValueError(f"found {option} {path}, wanted a name that ends in {ending}: type {option} {better}")
     if path.is_dir():
         raise OSError(f"found that {path} is a folder, wanted the name of a file: type {option} {path / 'NAME'}")
     require_writable_folder(path.parent, option)

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files: written whole or not at all, read with their types checked, in folders that one process owns."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import is_dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -60,18 +61,18 @@ def read_json(text: bytes | str, kind: type[T]) -> T:
 def as_type(values: Any, kind: type[T]) -> T:
     """What JSON's values say, as in `read_json`. A dataclass, and those within it, are refused values that are none of
     their fields."""
-    found = msgspec.convert(values, kind)
-    if is_dataclass(found) and (unknown := _unknown(values, msgspec.to_builtins(found))):
+    value = msgspec.convert(values, kind)
+    if is_dataclass(value) and (unknown := _unknown(values, msgspec.to_builtins(value))):
         raise ValueError(f"{unknown[0]} is none of the fields of {kind.__name__}")
-    return found
+    return value
 
 
 def _unknown(values: Any, known: Any) -> list[str]:
-    """Names in nested dictionaries that others do not have."""
+    """Names in nested dictionaries that `known` does not have."""
     if not isinstance(values, dict) or not isinstance(known, dict):
         return []
-    within = (_unknown(value, known[name]) for name, value in values.items() if name in known)
-    return [name for name in values if name not in known] + [one for part in within for one in part]
+    nested = (_unknown(value, known[name]) for name, value in values.items() if name in known)
+    return [*(name for name in values if name not in known), *chain.from_iterable(nested)]
 
 
 @contextmanager

@@ -68,9 +68,9 @@ def polygon_distance(first: Points, second: Points) -> float:
     """Shortest distance between two convex polygons in metres, 0 where they overlap."""
     if boxes_overlap(first, second):
         return 0.0
-    one = _points_to_segments(first, second, np.roll(second, -1, axis=0))
-    two = _points_to_segments(second, first, np.roll(first, -1, axis=0))
-    return float(min(one.min(), two.min()))
+    from_first = _points_to_segments(first, second, np.roll(second, -1, axis=0))
+    from_second = _points_to_segments(second, first, np.roll(first, -1, axis=0))
+    return float(min(from_first.min(), from_second.min()))
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Projection:
     heading: float
 
 
-BLEND = 1.0  # m
+BLEND = 1.0  # m to either side of a vertex over which a line's heading turns
 
 
 class Polyline:

@@ -1,4 +1,4 @@
-"""How an episode went: its outcome, its infractions and its figures."""
+"""How an episode went: its outcome, its infractions and its figures, in Python and in JSON."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any, Literal, TypedDict
 from caldrive.datatypes import KMH
 from caldrive.files import as_type
 from caldrive.scenarios import Scenario, scenario_from_values, scenario_values
+
+DIGITS = 4  # after the point, of numbers in files
 
 
 class Outcome(Enum):
@@ -34,6 +36,8 @@ class InfractionKind(Enum):
 
 @dataclass(frozen=True)
 class Infraction:
+    """A rule that was broken: when (s), where (x, y of the ego in m), and whether it was the ego's own fault."""
+
     kind: InfractionKind
     time: float
     x: float
@@ -43,7 +47,10 @@ class Infraction:
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """duration in s, distance in m, route_done and route_length in m, comfort: figures by name."""
+    """The whole episode: duration in s; distance driven, route_done and route_length in m; comfort: figures by name.
+
+    Raises ValueError for values that cannot be measured.
+    """
 
     scenario: Scenario
     outcome: Outcome
@@ -62,11 +69,8 @@ class EpisodeResult:
             raise ValueError(f"{self.route_done} m of {self.route_length} m are no part of a route: look at its length")
 
 
-DIGITS = 4
-
-
 def plain(value: Any) -> Any:
-    """The value as JSON knows it: rounded, and null where it is no number."""
+    """The value as JSON knows it: rounded to DIGITS, and null where it is no number."""
     if isinstance(value, float):
         return round(value, DIGITS) if math.isfinite(value) else None
     return value
@@ -92,22 +96,27 @@ class _Result(TypedDict):
 
 def result_from_values(values: Any) -> EpisodeResult:
     """The inverse of `result_values`, up to its rounding. Raises ValueError for what is no result."""
-    found = as_type(values, _Result)
-    length = math.inf if found["route_length"] is None else found["route_length"]
+    fields = as_type(values, _Result)
     return EpisodeResult(
-        scenario_from_values(found["scenario"]), Outcome[found["outcome"].upper()], found["duration"],
-        found["distance"], found["route_done"], length, found["infractions"], found["comfort"],
-    )  # fmt: skip
+        scenario=scenario_from_values(fields["scenario"]),
+        outcome=Outcome[fields["outcome"].upper()],
+        duration=fields["duration"],
+        distance=fields["distance"],
+        route_done=fields["route_done"],
+        route_length=math.inf if fields["route_length"] is None else fields["route_length"],
+        infractions=fields["infractions"],
+        comfort=fields["comfort"],
+    )
 
 
 def result_values(result: EpisodeResult) -> dict[str, Any]:
     """An EpisodeResult in JSON's types; mean_speed in km/h."""
-    broken = [asdict(one) | {"kind": one.kind.value} for one in result.infractions]
+    infractions = [asdict(infraction) | {"kind": infraction.kind.value} for infraction in result.infractions]
     return {
         "scenario": scenario_values(result.scenario),
         "outcome": result.outcome.name.lower(),
         "message": result.outcome.value,
-        "infractions": [{name: plain(value) for name, value in one.items()} for one in broken],
+        "infractions": [{name: plain(value) for name, value in row.items()} for row in infractions],
         "comfort": {name: plain(value) for name, value in result.comfort.items()},
         "mean_speed": plain(mean_speed(result)),
         **{name: plain(getattr(result, name)) for name in ("duration", "distance", "route_done", "route_length")},

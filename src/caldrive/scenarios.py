@@ -1,8 +1,4 @@
-"""The vocabulary that every part of caldrive shares, as frozen dataclasses.
-
-Units are SI, axes are ISO 8855: x forward (or east), y left (or north), headings counter-clockwise in radians.
-Speeds on signs are the one exception: they are the km/h that stand on the sign.
-"""
+"""A scenario: the conditions of one episode, in Python and in JSON (recordings, results and suites keep it)."""
 
 from __future__ import annotations
 
@@ -16,19 +12,28 @@ from caldrive.files import as_type
 
 @dataclass(frozen=True)
 class Scenario:
-    """One episode's conditions. town: a name or the path of an .xodr file. time_limit in s. crossing: how many times
-    as often as usual pedestrians cross."""
+    """The conditions of one episode. Raises ValueError for values that cannot be."""
 
     town: str
+    """A town's name, or the path of an OpenDRIVE file."""
     weather: int
+    """One of CARLA's weathers, 1 to 14."""
     start: Pose
+    """Where the ego begins: its centre, and its heading."""
     goal: Pose
+    """Where the episode succeeds."""
     n_vehicles: int = 0
+    """Other cars."""
     n_pedestrians: int = 0
+    """Pedestrians."""
     time_limit: float = math.inf
+    """s until the episode ends without success."""
     seed: int = 0
+    """Decides everything random: traffic, pedestrians, lights."""
     task: str = ""
+    """The task's name, for tables."""
     crossing: float = 1.0
+    """How many times as often as usual pedestrians cross the road."""
 
     def __post_init__(self) -> None:
         for name in ("n_vehicles", "n_pedestrians", "seed", "crossing"):
