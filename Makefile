@@ -9,19 +9,26 @@ SHELL := /bin/bash
 MODEL := out/model
 RESULTS := out/results
 
-.PHONY: drive test lint model results clean
+.PHONY: drive test lint docs coverage model results clean
 drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
 # Each of the two has a core of its own: more threads would only take turns.
-test: $(READY) lint
-	LP_NUM_THREADS=0 OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 $(ARGS)
+PYTEST := LP_NUM_THREADS=0 OMP_NUM_THREADS=1 $(BIN)/pytest -n 2
+
+test: $(READY) lint docs
+	$(PYTEST) $(ARGS)
 
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python scripts/large_files.py
+
+# The pages in out/docs; a warning is an error. Nothing is fetched.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 # From nothing to a network like the one that the package ships; a run that was stopped goes on. The log keeps every step's time.
 model: $(READY)
@@ -62,7 +69,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
 		{ echo "Found $$($(PYTHON) --version), need Python 3.11 to 3.13: install one or run make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,test]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,docs,test]'
 	touch $(READY)
 
 clean:
