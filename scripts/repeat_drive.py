@@ -15,7 +15,19 @@ import sys
 import time
 from pathlib import Path
 
-DRIVE = ["--town", "town02", "--weather", "14", "--task", "navigation-dynamic", "--cap", "20", "--seconds", "60", "--no-video"]
+DRIVE = [
+    "--town",
+    "town02",
+    "--weather",
+    "14",
+    "--task",
+    "navigation-dynamic",
+    "--cap",
+    "20",
+    "--seconds",
+    "60",
+    "--no-video",
+]
 
 
 def drive(out: Path, arguments: list[str]) -> str:

@@ -37,9 +37,9 @@ def town(request: pytest.FixtureRequest) -> RoadNetwork:
 @pytest.fixture
 def fresh_worker() -> Iterator[None]:
     """The test begins like a benchmark's new worker and leaves nothing running."""
-    runner._set_up.cache_clear()
+    runner._worker.cache_clear()
     yield
-    runner._set_up.cache_clear()
+    runner._worker.cache_clear()
     stop_sumo()
 
 

@@ -1,4 +1,4 @@
-"""A few fixed situations whose numbers stand for the behaviour of the whole: `python -m tests.situations` keeps them.
+"""A few fixed situations whose numbers stand for the metrics of the whole: `python -m tests.situations` keeps them.
 
 The numbers are rounded and compared with a tolerance, as processors of different kinds differ in the last bits.
 """
@@ -19,7 +19,7 @@ import numpy as np
 
 from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.agents.registry import SHIPPED_MODEL
-from caldrive.benchmark.behaviour import Behaviour
+from caldrive.benchmark.episode_metrics import EpisodeMetrics
 from caldrive.benchmark.suites import SUITES, suite, to_json
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.recorder import record_episode
@@ -67,10 +67,10 @@ def numbers(value: Any) -> Iterator[float]:
 def driven(world: EmbeddedWorld, agent: Agent, scenario: Scenario) -> list[float]:
     """A drive's ego, control, truth and neighbours in every twentieth step, and what referee and figures say of it."""
     rows: list[Any] = []
-    behaviour = Behaviour()
+    metrics = EpisodeMetrics()
 
     def watch(step: Step) -> None:
-        behaviour.add(step)
+        metrics.add(step)
         if round(step.truth.time * 10) % 20 == 0:
             cars = [astuple(car.pose) for car in step.truth.vehicles[:5]]
             people = [astuple(one.pose) for one in step.truth.pedestrians[:5]]
@@ -78,7 +78,7 @@ def driven(world: EmbeddedWorld, agent: Agent, scenario: Scenario) -> list[float
             rows.append([astuple(step.truth.affordances), step.truth.opposite_share, step.truth.speed_limit])
 
     result = run_episode(world, agent, scenario, watch, Referee(scenario))
-    return list(numbers([rows, result_values(result), behaviour.figures(result.infractions)]))
+    return list(numbers([rows, result_values(result), metrics.metrics(result.infractions)]))
 
 
 def limited(town: str, task: str, number: int, weather: int = 6, **traffic: int) -> Scenario:

@@ -10,6 +10,7 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -17,31 +18,57 @@ from typing import Any
 import tyro
 from tyro import _errors  # its one way to hear of a mistake before it is printed in a box; pinned in pyproject.toml
 
+from caldrive import __version__
 from caldrive.commands import VERBS, Answer, command_type, verb_words
 from caldrive.config import from_toml
-from caldrive.progress import progress_bar
+from caldrive.progress import only_answers_on_stdout, progress_bar
 
 DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
 FULL = (errno.ENOSPC, errno.EDQUOT)
+FAILED, STOPPED = 2, 130  # exit codes
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    if words == ["--version"]:
+        return _answered(Answer({"version": __version__}, f"caldrive {__version__}"), as_json=False)
     try:
-        command = parse(sys.argv[1:] if arguments is None else arguments)
-        with progress_bar() as progress:
+        command = parse(words)
+        with only_answers_on_stdout(), progress_bar() as progress:
             answer: Answer = command.run(progress)
-        _print(answer, command.json)
-        return answer.code
+        return _answered(answer, command.json)
     except KeyboardInterrupt:
-        print("caldrive: stopped by Ctrl-C", file=sys.stderr)
-        return 130
-    except (ValueError, OSError, RuntimeError) as error:
+        _say("caldrive: stopped by Ctrl-C")
+        return STOPPED
+    except BrokenPipeError:  # whoever read the answer has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except Exception as error:  # the last door: nothing but one sentence gets through it
         if os.environ.get("CALDRIVE_TRACEBACK"):  # for those who look for the cause in the code
             raise
-        print(f"caldrive: {_sentence(error)}", file=sys.stderr)
-        return 2
+        return _failed(_sentence(error), "--json" in words)
+
+
+def _answered(answer: Answer, as_json: bool) -> int:
+    _print(answer, as_json)
+    sys.stdout.flush()
+    return answer.code
+
+
+def _failed(sentence: str, as_json: bool) -> int:
+    """Says what went wrong, to people and, where JSON was asked for, to programs."""
+    _say(f"caldrive: {sentence}")
+    if as_json:
+        print(json.dumps({"error": sentence}))
+    return FAILED
+
+
+def _say(text: str) -> None:
+    """A line on stderr, if anybody can hear it."""
+    with suppress(OSError, ValueError, AttributeError):  # it may be closed, or not there at all
+        print(text, file=sys.stderr)
 
 
 def parse(arguments: Sequence[str]) -> Any:
@@ -107,11 +134,17 @@ def _mistake(event: Any, verb: str) -> str:
 
 def _sentence(error: Exception) -> str:
     """An error in one line."""
+    text = " ".join(str(error).split())
     if isinstance(error, OSError) and error.errno in FULL:
         return f"found no room on the disk for {error.filename or 'a file'}, wanted some: make room, and type it again"
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"found that {error.filename} is no use ({error.strerror.lower()}), wanted one that is: give another"
-    return " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, MemoryError):
+        return "found too little memory for this, wanted more: ask for less, or close other programs"
+    if isinstance(error, ValueError | OSError | RuntimeError) and text:
+        return text
+    kind = type(error).__name__
+    return f"found a fault of the program ({kind}: {text}), wanted none: set CALDRIVE_TRACEBACK=1 to see where it is"
 
 
 def _print(answer: Answer, as_json: bool) -> None:

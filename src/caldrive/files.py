@@ -76,8 +76,11 @@ def _unknown(values: Any, known: Any) -> list[str]:
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Keeps a folder for this process; two that write at once would lose lines. Raises ValueError where it is kept."""
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Keeps a folder, made if need be, for this process; two that write at once would lose results.
+
+    The lock ends with the block, or with the process. Raises ValueError where another process has it.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     file = os.open(folder, os.O_RDONLY)
     try:
@@ -92,5 +95,5 @@ def _lock(file: int, folder: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise ValueError(
-            f"found another benchmark at work in {folder}, wanted it alone: wait for it, or give another --out"
+            f"found another process at work in {folder}, wanted the folder alone: wait for it, or give another --out"
         ) from error

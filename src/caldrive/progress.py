@@ -1,7 +1,8 @@
-"""How long work tells whoever watches how far it is."""
+"""What the terminal is told while work goes on: how far it is, and nothing that is not asked for."""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ def silent(label: str, share: float) -> None:
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
     """A bar on stderr, where people sit before it."""
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty():
         yield silent
         return
     from rich.console import Console
@@ -32,3 +33,25 @@ def progress_bar() -> Iterator[Progress]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("starting", total=1.0)
         yield lambda label, share: bar.update(task, description=label, completed=share)
+
+
+@contextmanager
+def only_answers_on_stdout() -> Iterator[None]:
+    """Sends what libraries print meanwhile to stderr, from C code, too: stdout is for the answer, which may be JSON.
+
+    Without a stdout or stderr of its own, as inside some other programs, nothing is moved.
+    """
+    try:
+        out, err = sys.stdout.fileno(), sys.stderr.fileno()
+        kept = os.dup(out)
+    except (OSError, ValueError, AttributeError):
+        yield
+        return
+    sys.stdout.flush()
+    os.dup2(err, out)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, out)
+        os.close(kept)

@@ -8,8 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.benchmark.metrics import cells, comfort, completion, driving_score, errors, rates, reds, wilson
-from caldrive.benchmark.suites import Driven, Trial
+from caldrive.benchmark.metrics import (
+    cells,
+    driving_score,
+    infraction_rates,
+    mean_comfort,
+    mean_errors,
+    red_light_counts,
+    route_completion,
+    wilson,
+)
+from caldrive.benchmark.suites import Trial, TrialResult
 from caldrive.datatypes import Pose
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import Scenario
@@ -18,12 +27,14 @@ SCENARIO = Scenario("town01", 1, Pose(0, 0, 0), Pose(1, 0, 0), task="one-turn")
 
 
 def driven(
-    outcome: Outcome = Outcome.SUCCESS, broken: tuple[InfractionKind, ...] = (), done: float = 500.0, **change: Any
-) -> Driven:
-    result = EpisodeResult(
-        replace(SCENARIO, **change), outcome, 60.0, 500.0, done, 1000.0, tuple(Infraction(k, 1.0, 0, 0) for k in broken)
-    )
-    return Driven(Trial("a", "training", result.scenario), result, {})
+    outcome: Outcome = Outcome.SUCCESS, kinds: tuple[InfractionKind, ...] = (), done: float = 500.0, **change: Any
+) -> TrialResult:
+    """An episode of 60 s and 500 m with infractions of these kinds. done: m of a route of 1 km."""
+    episode = EpisodeResult(
+        scenario=replace(SCENARIO, **change), outcome=outcome, duration=60.0, distance=500.0, route_done=done,
+        route_length=1000.0, infractions=tuple(Infraction(kind, time=1.0, x=0, y=0) for kind in kinds),
+    )  # fmt: skip
+    return TrialResult(Trial("a", "training", episode.scenario), episode, metrics={})
 
 
 # Known intervals: Brown, Cai and DasGupta's formula by hand for 0, 5 and 25 of 25.
@@ -53,49 +64,48 @@ def test_cells_count_by_condition_and_task() -> None:
 
 def test_only_a_goal_reached_without_a_fault_of_ones_own_is_clean() -> None:
     hit = Infraction(InfractionKind.COLLISION_CAR, 1.0, 0, 0, at_fault=False)
-    by_others = replace(driven(), result=replace(driven().result, infractions=(hit,)))
-    found = cells([driven(), by_others, driven(Outcome.TIMEOUT), driven(broken=(InfractionKind.SIDEWALK,))])
+    by_others = replace(driven(), episode=replace(driven().episode, infractions=(hit,)))
+    found = cells([driven(), by_others, driven(Outcome.TIMEOUT), driven(kinds=(InfractionKind.SIDEWALK,))])
     assert [(cell.episodes, cell.successes, cell.clean) for cell in found] == [(4, 3, 2)]
 
 
 def test_the_way_covered_never_leaves_its_bounds() -> None:
-    assert completion(driven(Outcome.TIMEOUT, done=-5.0)) == 0.0
-    assert completion(driven(Outcome.TIMEOUT, done=2000.0)) == 1.0
+    assert route_completion(driven(Outcome.TIMEOUT, done=-5.0)) == 0.0
+    assert route_completion(driven(Outcome.TIMEOUT, done=2000.0)) == 1.0
 
 
 def test_the_driving_score_is_the_leaderboards() -> None:
     assert driving_score(driven()) == 100
     assert driving_score(driven(Outcome.TIMEOUT)) == pytest.approx(50)
-    assert driving_score(driven(broken=(InfractionKind.COLLISION_PERSON,))) == pytest.approx(50)
-    assert driving_score(driven(broken=(InfractionKind.RED_LIGHT,) * 2)) == pytest.approx(100 / 1.8)
-    assert driving_score(replace(driven(), figures={"off_lane": 0.25})) == pytest.approx(75)
+    assert driving_score(driven(kinds=(InfractionKind.COLLISION_PERSON,))) == pytest.approx(50)
+    assert driving_score(driven(kinds=(InfractionKind.RED_LIGHT,) * 2)) == pytest.approx(100 / 1.8)
+    assert driving_score(replace(driven(), metrics={"off_lane": 0.25})) == pytest.approx(75)
 
 
 def test_kilometres_between_infractions_are_open_where_none_occurred() -> None:
-    found = {rate.kind: rate for rate in rates([driven(broken=(InfractionKind.SIDEWALK,) * 2)] * 3)}
+    found = {rate.kind: rate for rate in infraction_rates([driven(kinds=(InfractionKind.SIDEWALK,) * 2)] * 3)}
     assert found[InfractionKind.SIDEWALK].km_between == "0.25"
     assert found[InfractionKind.RED_LIGHT].km_between == "> 1.5"
 
 
 def test_what_others_cause_does_not_count() -> None:
-    one = driven()
     hit = Infraction(InfractionKind.COLLISION_CAR, 1.0, 0, 0, at_fault=False)
-    one = replace(one, result=replace(one.result, infractions=(hit,)))
-    assert all(rate.count == 0 for rate in rates([one]))
+    by_others = replace(driven(), episode=replace(driven().episode, infractions=(hit,)))
+    assert all(rate.count == 0 for rate in infraction_rates([by_others]))
 
 
-def rode(duration: float, figures: dict[str, Any], **ride: float) -> Driven:
-    """An episode of so many seconds with these figures of behaviour and of comfort."""
-    one = driven()
-    return replace(one, result=replace(one.result, duration=duration, comfort=ride), figures=figures)
+def lasting(duration: float, metrics: dict[str, Any], **comfort: float) -> TrialResult:
+    """An episode of so many seconds with these metrics."""
+    result = driven()
+    return replace(result, episode=replace(result.episode, duration=duration, comfort=comfort), metrics=metrics)
 
 
 def test_comfort_weighs_each_episode_by_its_time() -> None:
-    first = rode(10.0, {}, center_distance=0.1, jerk=1.0, lateral_straight=1.0, lateral_turn=3.0, turning=10.0,
-                 comfortable=1.0)  # fmt: skip
-    second = rode(30.0, {}, center_distance=0.3, jerk=3.0, lateral_straight=2.0, lateral_turn=9.0, turning=0.0,
-                  comfortable=0.5)  # fmt: skip
-    found = comfort([first, second])
+    first = lasting(10.0, {}, center_distance=0.1, jerk=1.0, lateral_straight=1.0, lateral_turn=3.0, turning=10.0,
+                    comfortable=1.0)  # fmt: skip
+    second = lasting(30.0, {}, center_distance=0.3, jerk=3.0, lateral_straight=2.0, lateral_turn=9.0, turning=0.0,
+                     comfortable=0.5)  # fmt: skip
+    found = mean_comfort([first, second])
     assert found["center_distance"] == pytest.approx(0.2)  # the median of two
     assert found["jerk"] == pytest.approx(math.sqrt((10 * 1 + 30 * 9) / 40))
     assert found["lateral_straight"] == pytest.approx(2.0)  # the first one only turned
@@ -104,10 +114,10 @@ def test_comfort_weighs_each_episode_by_its_time() -> None:
 
 
 def test_red_lights_are_those_stopped_for_and_those_run() -> None:
-    ran = replace(driven(broken=(InfractionKind.RED_LIGHT,)), figures={"reds_obeyed": 0})
-    assert reds([replace(driven(), figures={"reds_obeyed": 3}), ran]) == (4, 1)
+    ran = replace(driven(kinds=(InfractionKind.RED_LIGHT,)), metrics={"reds_obeyed": 0})
+    assert red_light_counts([replace(driven(), metrics={"reds_obeyed": 3}), ran]) == (4, 1)
 
 
 def test_errors_weigh_each_episode_by_its_time_where_something_was_seen() -> None:
-    seen = [rode(10.0, {"error/hazard_stop": 0.1}), rode(30.0, {"error/hazard_stop": 0.3}), rode(60.0, {})]
-    assert errors(seen) == {"hazard_stop": pytest.approx(0.25)}
+    seen = [lasting(10.0, {"error/hazard_stop": 0.1}), lasting(30.0, {"error/hazard_stop": 0.3}), lasting(60.0, {})]
+    assert mean_errors(seen) == {"hazard_stop": pytest.approx(0.25)}

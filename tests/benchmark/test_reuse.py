@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from caldrive.benchmark import runner as runner
-from caldrive.benchmark.reuse import driven_elsewhere
+from caldrive.benchmark.reuse import reusable_records
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.benchmark.runner import benchmark
 from caldrive.benchmark.settings import BenchmarkSettings
@@ -50,7 +50,7 @@ def test_what_is_taken_over_is_what_driving_gives(tmp_path: Path, monkeypatch: p
     taken = replace(other, out=tmp_path / "taken", known=(tmp_path / "first",))
     monkeypatch.setattr(runner, "drive_trial", lambda driver, trial: pytest.fail("drives"))
     assert list(benchmark(taken)) == []
-    assert len(RunFolder(taken.out).driven()) == 2
+    assert len(RunFolder(taken.out).results()) == 2
     assert contents(taken.out) == contents(other.out)
 
 
@@ -85,23 +85,23 @@ def test_an_episode_that_would_end_elsewhere_is_driven_again(
 ) -> None:
     trial = replace(suite("quick")[0], fatal=fatal)
     folder = known_folder(tmp_path, trial, outcome, kinds)
-    found = list(driven_elsewhere([RunFolder(folder)], [trial], BY))
+    found = list(reusable_records([RunFolder(folder)], [trial], BY))
     assert [one.line["key"] for one in found] == ([trial.key] if taken else [])
 
 
 def test_an_episode_without_its_trace_is_driven(tmp_path: Path) -> None:
     trial = suite("quick")[0]
     folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
-    assert len(list(driven_elsewhere([RunFolder(folder)], [trial], BY))) == 1
+    assert len(list(reusable_records([RunFolder(folder)], [trial], BY))) == 1
     (folder / "traces" / "x-0.json.gz").unlink()
-    assert list(driven_elsewhere([RunFolder(folder)], [trial], BY)) == []
+    assert list(reusable_records([RunFolder(folder)], [trial], BY)) == []
 
 
 def test_an_episode_of_other_traffic_is_driven(tmp_path: Path) -> None:
     trial = suite("quick")[0]
     folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
     busier = replace(trial, scenario=replace(trial.scenario, n_vehicles=7))
-    assert list(driven_elsewhere([RunFolder(folder)], [busier], BY)) == []
+    assert list(reusable_records([RunFolder(folder)], [busier], BY)) == []
 
 
 @pytest.mark.parametrize(("name", "value"), [("code", "2"), ("agent", "cal"), ("cap", None), ("model", "3")])
@@ -109,4 +109,4 @@ def test_episodes_driven_by_something_else_are_refused(name: str, value: object,
     trial = suite("quick")[0]
     folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
     with pytest.raises(ValueError, match=f"episodes with {name} .*leave that --known out"):
-        list(driven_elsewhere([RunFolder(folder)], [trial], BY | {name: value}))
+        list(reusable_records([RunFolder(folder)], [trial], BY | {name: value}))

@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 
 from caldrive.benchmark import run_folder
-from caldrive.benchmark.evidence import read_trace, trace_path
+from caldrive.benchmark.artifacts import read_trace, trace_path
 from caldrive.benchmark.replay import replay
-from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, as_driven, read_lines, suite_content
+from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, read_lines, suite_digest, trial_result
 from caldrive.benchmark.runner import benchmark
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import suite, to_json
 from caldrive.datatypes import Pose
-from caldrive.files import held
+from caldrive.files import locked_folder
 from caldrive.provenance import code_version
 from tests.benchmark.traces import trace
 
@@ -57,7 +57,7 @@ def test_a_run_broken_off_goes_on_to_the_same_results(whole: BenchmarkSettings, 
     assert len(read_lines(tmp_path)) == 1
     assert [step.done for step in benchmark(broken)] == [2, 3, 4]
     assert lines(broken) == lines(whole)
-    assert RunFolder(broken.out).driven() == RunFolder(whole.out).driven()
+    assert RunFolder(broken.out).results() == RunFolder(whole.out).results()
     assert list(benchmark(broken)) == []
 
 
@@ -77,10 +77,10 @@ def test_rays_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Pa
 
 
 def test_results_stand_in_the_suites_order(whole: BenchmarkSettings) -> None:
-    found = RunFolder(whole.out).driven()
+    found = RunFolder(whole.out).results()
     assert [one.trial for one in found] == suite(whole.suite)
-    assert all(one.result.duration == pytest.approx(3.0, abs=0.11) for one in found)
-    assert all(one.figures["error/center_distance"] == 0 for one in found)  # the oracle's
+    assert all(one.episode.duration == pytest.approx(3.0, abs=0.11) for one in found)
+    assert all(one.metrics["error/center_distance"] == 0 for one in found)  # the oracle's
 
 
 @pytest.mark.parametrize("change", [{"signs": True}, {"cap": 30.0}, {"controller": "paper"}])
@@ -111,7 +111,7 @@ def test_results_that_nothing_says_whose_they_are_are_refused(whole: BenchmarkSe
 
 
 def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
-    with held(tmp_path), pytest.raises(ValueError, match="another benchmark at work"):
+    with locked_folder(tmp_path), pytest.raises(ValueError, match="another process at work"):
         next(benchmark(replace(whole, out=tmp_path)))
 
 
@@ -140,9 +140,9 @@ def test_results_of_another_episode_of_the_same_name_are_refused(whole: Benchmar
     (trial, *_) = suite(whole.suite)
     line = read_lines(whole.out)[trial.key]
     other = replace(trial, scenario=replace(trial.scenario, seed=9))
-    assert as_driven(trial, line).trial is trial
+    assert trial_result(trial, line).trial is trial
     with pytest.raises(ValueError, match="another episode when it was driven"):
-        as_driven(other, line)
+        trial_result(other, line)
 
 
 @pytest.mark.parametrize("change", [{"seed": 3}, {"time_limit": "code"}, {"seed": -1}])
@@ -199,7 +199,7 @@ def test_a_suite_that_has_changed_since_is_refused(whole: BenchmarkSettings, tmp
     trials = suite(whole.suite)
     elsewhere = replace(trials[0], key="x", scenario=replace(trials[0].scenario, town=str(town)))
     path.write_text(to_json([*trials, elsewhere]))
-    about = RunFolder(whole.out).about | {"suite": str(path), "suite_content": suite_content(path)}
+    about = RunFolder(whole.out).description | {"suite": str(path), "suite_content": suite_digest(path)}
     (tmp_path / "run.json").write_text(json.dumps(about))
     assert len(RunFolder(tmp_path).trials) == len(trials) + 1
     shorter = to_json(trials[:1])
@@ -252,14 +252,14 @@ def folder(whole: BenchmarkSettings, tmp_path: Path) -> RunFolder:
 def test_a_worker_that_drives_with_something_else_is_refused(name: str, folder: RunFolder) -> None:
     record = EpisodeRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, {name: "other"})
     with pytest.raises(ValueError, match=f"worker with {name} other.*install the same caldrive and model"):
-        folder.keep(record)
+        folder.save(record)
     assert [path.name for path in folder.path.iterdir()] == ["run.json"]
 
 
 def test_files_are_there_before_their_line(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_folder, "_append", lambda path, line: pytest.fail("was killed before the line"))
     with pytest.raises(pytest.fail.Exception):
-        folder.keep(EpisodeRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, {}))
+        folder.save(EpisodeRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, {}))
     assert (folder.path / "traces" / "a.json.gz").read_bytes() == b"x"
     assert folder.lines() == {}
 
@@ -267,7 +267,7 @@ def test_files_are_there_before_their_line(folder: RunFolder, monkeypatch: pytes
 def test_results_that_are_kept_may_be_compressed(whole: BenchmarkSettings, folder: RunFolder) -> None:
     packed_lines = gzip.compress((whole.out / "results.jsonl").read_bytes())
     (folder.path / "results.jsonl.gz").write_bytes(packed_lines)
-    assert folder.driven() == RunFolder(whole.out).driven()
+    assert folder.results() == RunFolder(whole.out).results()
     (folder.path / "results.jsonl.gz").write_bytes(packed_lines[:-20])
     with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl\.gz"):
         folder.lines()

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from caldrive.benchmark.suites import COLLISIONS, OFFENCES, from_json, suite, to_json
+from caldrive.benchmark.suites import COLLISIONS, TRAFFIC_RULES, from_json, suite, to_json
 from caldrive.results import InfractionKind
 
 
@@ -62,7 +62,7 @@ def test_only_the_dynamic_task_has_others_on_the_road() -> None:
     assert {n for (_, task), n in traffic.items() if task != "navigation-dynamic"} == {(0, 0)}
 
 
-@pytest.mark.parametrize(("name", "fatal"), [("nocrash", COLLISIONS), ("traffic-school", OFFENCES)])
+@pytest.mark.parametrize(("name", "fatal"), [("nocrash", COLLISIONS), ("traffic-school", TRAFFIC_RULES)])
 def test_nocrash_ends_at_collisions_and_traffic_school_at_every_offence(
     name: str, fatal: tuple[InfractionKind, ...]
 ) -> None:

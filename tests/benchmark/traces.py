@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 
-def trace(n: int = 600, **columns: Any) -> dict[str, list[Any]]:
+def trace(n: int = 600, /, **columns: Any) -> dict[str, list[Any]]:
     """A minute of driving east at 5 m/s on the centre line, with what is asked for instead."""
     plain: dict[str, Any] = {
         "time": np.arange(n) / 10, "x": np.arange(n) / 2, "y": 0.0, "speed": 5.0, "command": "straight",

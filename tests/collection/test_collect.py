@@ -36,9 +36,9 @@ TINY = CollectConfig(
 @pytest.fixture(autouse=True)
 def _fresh() -> Iterator[None]:
     """Each test begins like a new process and leaves nothing running."""
-    collection._let_go()
+    collection._close_world()
     yield
-    collection._let_go()
+    collection._close_world()
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_a_recording_broken_off_between_episodes_ends_like_an_unbroken_one(unbro
     recording.close()  # type: ignore[attr-defined]
     first = contents(tmp_path)
     assert list(first) == ["episode-00000.parquet"]
-    collection._let_go()
+    collection._close_world()
     assert [k for k, _ in collect(TINY, tmp_path)] == [1, 2]
     assert contents(tmp_path) == contents(unbroken)
 

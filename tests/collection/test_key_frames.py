@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from caldrive.collection.recorder import KeyFrames
+from caldrive.collection.recorder import KeyFrameSelector
 from caldrive.datatypes import Affordances
 
 STREET = Affordances()
@@ -15,11 +15,11 @@ def taken(
     labels: Callable[[int], Affordances] = lambda k: STREET,
 ) -> list[int]:  # fmt: skip
     """The key frames among as many moments as a drive may last, until there are enough."""
-    frames, found = KeyFrames(wanted, tailgating), list[int]()
-    for k in range(frames.most):
-        if frames.takes(labels(k), speed(k)):
+    frames, found = KeyFrameSelector(wanted, tailgating), list[int]()
+    for k in range(frames.max_steps):
+        if frames.select(labels(k), speed(k)):
             found.append(k)
-        if frames.taken == wanted:
+        if frames.selected == wanted:
             break
     return found
 
@@ -47,5 +47,5 @@ def test_a_tailgater_tells_of_the_beginning_and_of_the_cars_met() -> None:
 
 
 def test_an_episode_in_which_the_car_stands_on_ends() -> None:
-    assert KeyFrames(50, tailgating=False).most == 100
-    assert KeyFrames(50, tailgating=True).most == 300
+    assert KeyFrameSelector(50, tailgating=False).max_steps == 100
+    assert KeyFrameSelector(50, tailgating=True).max_steps == 300

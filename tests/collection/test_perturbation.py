@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.collection.perturbation import Disturbance, LateStart
+from caldrive.collection.perturbation import ControlPerturbation, DelayedStart
 from caldrive.datatypes import Control
 
 controls = st.builds(
@@ -18,7 +18,7 @@ controls = st.builds(
 
 @given(st.integers(0, 2**32), st.lists(st.tuples(controls, st.floats(0, 25)), min_size=1, max_size=60))
 def test_a_disturbance_is_bounded_and_ends(seed: int, drive: list[tuple[Control, float]]) -> None:
-    disturbance, before, slowest = Disturbance(np.random.default_rng(seed)), [0.0], 25.0
+    disturbance, before, slowest = ControlPerturbation(np.random.default_rng(seed)), [0.0], 25.0
     for control, speed in drive:
         pushed = disturbance.apply(control, speed)  # a Control checks its own ranges
         before.append(control.steer)
@@ -28,7 +28,7 @@ def test_a_disturbance_is_bounded_and_ends(seed: int, drive: list[tuple[Control,
 
 
 def pushes(speed: float, seed: int = 0, steps: int = 20_000, control: Control | None = None) -> list[Control]:
-    disturbance, control = Disturbance(np.random.default_rng(seed)), control or Control(throttle=0.4)
+    disturbance, control = ControlPerturbation(np.random.default_rng(seed)), control or Control(throttle=0.4)
     return [disturbance.apply(control, speed) for _ in range(steps)]
 
 
@@ -54,7 +54,7 @@ def test_a_hard_braking_car_is_left_to_brake() -> None:
 
 
 def test_a_wheel_that_stays_lets_the_car_turn_too_late() -> None:
-    disturbance, steers = Disturbance(np.random.default_rng(1)), []
+    disturbance, steers = ControlPerturbation(np.random.default_rng(1)), []
     for k in range(2000):
         wanted = 0.0 if k % 20 < 10 else 0.5
         steers.append((wanted, disturbance.apply(Control(throttle=0.4, steer=wanted), 5.0).steer))
@@ -64,7 +64,7 @@ def test_a_wheel_that_stays_lets_the_car_turn_too_late() -> None:
 
 def standing_times(seed: int) -> list[int]:
     """Steps for which a driver stands on at each of two hundred lights that turned green."""
-    start, found = LateStart(np.random.default_rng(seed)), []
+    start, found = DelayedStart(np.random.default_rng(seed)), []
     for _ in range(200):
         speed, stood = 0.0, 0
         for _ in range(20):  # red
@@ -87,12 +87,12 @@ def test_a_late_start_is_late_in_half_of_the_cases_and_2_s_at_most() -> None:
 
 
 def test_a_car_on_its_way_is_never_held() -> None:
-    start = LateStart(np.random.default_rng(0))
+    start = DelayedStart(np.random.default_rng(0))
     assert {start.apply(Control(throttle=0.2), 0.4) for _ in range(500)} == {Control(throttle=0.2)}
 
 
 def test_who_has_braked_hard_brakes_on_in_half_of_the_cases() -> None:
-    start, found = LateStart(np.random.default_rng(3)), []
+    start, found = DelayedStart(np.random.default_rng(3)), []
     for _ in range(200):
         start.apply(Control(brake=0.9), 4.0)
         braking = [start.apply(Control(throttle=0.3), 2.0).brake for _ in range(25)]
@@ -103,7 +103,7 @@ def test_who_has_braked_hard_brakes_on_in_half_of_the_cases() -> None:
 
 
 def test_who_brakes_on_until_the_car_stands_dreams_once() -> None:
-    start, on_the_move = LateStart(np.random.default_rng(4)), []
+    start, on_the_move = DelayedStart(np.random.default_rng(4)), []
     for _ in range(200):
         start.apply(Control(brake=0.9), 4.0)
         braking = [start.apply(Control(throttle=0.3), speed).brake > 0 for speed in (1.6, 0.8, *[0.0] * 48)]
@@ -116,7 +116,7 @@ def test_who_brakes_on_until_the_car_stands_dreams_once() -> None:
 
 
 def test_who_has_braked_gently_goes_on() -> None:
-    start = LateStart(np.random.default_rng(3))
+    start = DelayedStart(np.random.default_rng(3))
     for _ in range(200):
         assert start.apply(Control(brake=0.3), 4.0) == Control(brake=0.3)
         assert start.apply(Control(throttle=0.3), 4.0) == Control(throttle=0.3)

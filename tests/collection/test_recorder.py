@@ -12,9 +12,9 @@ import pytest
 
 from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.collection.config import CollectConfig
-from caldrive.collection.perturbation import HiddenCars, Tailgater
+from caldrive.collection.oracles import HiddenCarsOracle, TailgatingOracle
 from caldrive.collection.recorder import BASELINES, record_episode
-from caldrive.collection.start_poses import Plan, begin_episode, plan_episode
+from caldrive.collection.start_poses import EpisodePlan, begin_episode, plan_episode
 from caldrive.control.controller import CALController
 from caldrive.datatypes import CameraConfig, Semantic
 from caldrive.recordings.reader import Episode, read_episode
@@ -49,7 +49,7 @@ def recording(
     return read_episode(episode_path(folder, number), semantic=semantic)
 
 
-def begun(world: EmbeddedWorld, config: CollectConfig) -> tuple[Plan, CALAgent]:
+def begun(world: EmbeddedWorld, config: CollectConfig) -> tuple[EpisodePlan, CALAgent]:
     """An episode's plan and driver."""
     rng = np.random.default_rng(1)
     plan = plan_episode(config, 0, rng)
@@ -131,7 +131,7 @@ def test_a_tailgater_drives_among_twice_the_cars_and_is_told_something_else(worl
     config = replace(TINY, before_signs=1.0, tailgating=1.0)
     plan, agent = begun(world, config)
     assert plan.scenario.n_vehicles == 2 * config.cars
-    assert isinstance(agent.perception, Tailgater)
+    assert isinstance(agent.perception, TailgatingOracle)
     assert isinstance(agent.controller, CALController)
     assert agent.controller.config.cap == 20.0
     assert begun(world, replace(config, tailgating=0.0))[0].scenario.n_vehicles <= config.cars
@@ -154,7 +154,7 @@ def test_other_houses_stand_along_the_same_streets(world: EmbeddedWorld, tmp_pat
 
 
 def test_in_some_episodes_the_driver_is_not_told_of_cars(world: EmbeddedWorld) -> None:
-    for share, kind in ((1.0, HiddenCars), (0.0, OraclePerception)):
+    for share, kind in ((1.0, HiddenCarsOracle), (0.0, OraclePerception)):
         config = replace(TINY, hidden_cars=share)
         assert type(begun(world, config)[1].perception) is kind
 

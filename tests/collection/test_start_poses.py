@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from caldrive.collection.start_poses import starting_place
+from caldrive.collection.start_poses import start_pose
 from caldrive.datatypes import Command
 from caldrive.world.roads.route import random_route
 from caldrive.world.roads.towns import load_roads
@@ -12,7 +12,7 @@ def test_starts_before_signs_lie_up_the_street_and_show_every_limit() -> None:
     roads, rng = load_roads("town01"), np.random.default_rng(0)
     passed = set()
     for _ in range(60):
-        start, turn = starting_place(roads, roads.signs, 1.0, 0.0, rng)
+        start, turn = start_pose(roads, roads.signs, 1.0, 0.0, rng)
         assert turn is None
         route = random_route(roads, start, 80.0, rng)
         near = [route.line.project(sign.pose.x, sign.pose.y) for sign in roads.signs]
@@ -23,7 +23,7 @@ def test_starts_before_signs_lie_up_the_street_and_show_every_limit() -> None:
 
 def test_starts_are_anywhere_where_no_share_is_asked_for() -> None:
     roads, rng = load_roads("town02"), np.random.default_rng(0)
-    lanes = {roads.lane_at(starting_place(roads, roads.signs, 0.0, 0.0, rng)[0])[0].id for _ in range(200)}
+    lanes = {roads.lane_at(start_pose(roads, roads.signs, 0.0, 0.0, rng)[0])[0].id for _ in range(200)}
     assert len(lanes) > 0.7 * sum(lane.line.length > 12 for lane in roads.driveable)
 
 
@@ -31,7 +31,7 @@ def test_starts_before_turns_lie_up_the_street_and_show_every_command() -> None:
     roads, rng = load_roads("town01"), np.random.default_rng(0)
     taken = []
     for _ in range(60):
-        start, turn = starting_place(roads, roads.signs, 0.0, 1.0, rng)
+        start, turn = start_pose(roads, roads.signs, 0.0, 1.0, rng)
         assert turn is not None
         route = random_route(roads, start, 80.0, rng, through=turn)
         assert turn in [lane for lane, _ in route.lanes]

@@ -13,7 +13,6 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from PIL import Image as Picture
 from rich.table import Table
 from rich.text import Text
 
@@ -21,7 +20,7 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.cli import _print, main
 from caldrive.commands.answer import Answer
 from caldrive.datatypes import Command, Observation
-from caldrive.driving.determinism import Digests, compare
+from caldrive.driving.determinism import EpisodeDigests, compare
 from caldrive.perception.network.config import BlockConfig, PerceptionConfig
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
 from caldrive.timing import Stopwatch
@@ -175,32 +174,26 @@ def test_two_fresh_processes_drive_the_same_bytes() -> None:
 def test_a_comparison_names_the_first_step_and_part_that_differ() -> None:
     steps = tuple(("image", "truth", "decision", f"control{i}") for i in range(5))
     other = (*steps[:3], ("image", "truth", "decision", "another"), steps[4])
-    assert compare(Digests(steps, "r"), Digests(steps, "r")).equal
-    assert compare(Digests(steps, "r"), Digests(other, "r")).difference == "step 3 (0.3 s) differs in its control"
+    assert compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps, "r")).equal
     assert (
-        compare(Digests(steps, "r"), Digests(steps[:4], "r")).difference
+        compare(EpisodeDigests(steps, "r"), EpisodeDigests(other, "r")).difference
+        == "step 3 (0.3 s) differs in its control"
+    )
+    assert (
+        compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps[:4], "r")).difference
         == "one run ends after 4 steps, the other goes on"
     )
-    assert compare(Digests(steps, "r"), Digests(steps, "q")).difference == "the results differ, though no step does"
+    assert (
+        compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps, "q")).difference
+        == "the results differ, though no step does"
+    )
 
 
 def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    different = compare(Digests((("a",) * 4,), "r"), Digests((("b",) * 4,), "r"))
+    different = compare(EpisodeDigests((("a",) * 4,), "r"), EpisodeDigests((("b",) * 4,), "r"))
     monkeypatch.setattr("caldrive.driving.determinism.check_determinism", lambda *_: different)
     assert main(["determinism"]) == 1
     assert "step 0 (0.0 s) differs in its image" in capsys.readouterr().out
-
-
-def test_town_writes_its_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def sheet(town: str, randomised: int) -> np.ndarray[Any, Any]:
-        return np.full((40, 80, 3), len(town) + randomised, np.uint8)
-
-    monkeypatch.setattr("caldrive.visualization.contact_sheet.contact_sheet", sheet)
-    found = run_json("town", "--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
-    assert (found["width"], found["height"]) == (160, 80)
-    with Picture.open(found["sheet"]) as picture:
-        assert picture.size == (160, 80)
-    assert [p.name for p in (tmp_path / "a").iterdir()] == ["town.png"]
 
 
 def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
@@ -209,7 +202,7 @@ def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
         "print('loaded', *{'torch', 'libsumo', 'moderngl', 'numpy', 'av'} & sys.modules.keys())"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert all(verb in shown for verb in ("drive", "town", "speed", "determinism"))
+    assert all(verb in shown for verb in ("drive", "see", "town", "speed", "determinism"))
     assert shown.splitlines()[-1].strip() == "loaded"
 
 

@@ -129,5 +129,5 @@ def test_a_map_too_small_for_a_task_says_so(town02: RoadNetwork) -> None:
 
     (lane,) = [one for one in town02.driveable if one.line.length > 60][:1]
     small = replace(town02, lanes={lane.id: replace(lane, successors=())})
-    with pytest.raises(ValueError, match="found 0 routes for navigation in town02, wanted 3: the map is too small"):
+    with pytest.raises(ValueError, match="found 0 routes for navigation in town02, wanted 3: give a larger map"):
         draw_routes(small, "navigation", 3, np.random.default_rng(0))

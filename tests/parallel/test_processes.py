@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from caldrive.parallel.processes import spread
+from caldrive.parallel.processes import parallel_map
 
 
 def _square(k: int) -> int:
@@ -37,23 +37,23 @@ def _fails(k: int) -> int:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_all_work_is_done_once(workers: int) -> None:
-    assert sorted(spread(_square, range(7), workers)) == [(k, k * k) for k in range(7)]
+    assert sorted(parallel_map(_square, range(7), workers)) == [(k, k * k) for k in range(7)]
 
 
 def test_the_work_of_workers_that_die_is_done_again(tmp_path: Path) -> None:
-    assert sorted(spread(partial(_dies_at_first, tmp_path), range(6), 2)) == [(k, k * k) for k in range(6)]
+    assert sorted(parallel_map(partial(_dies_at_first, tmp_path), range(6), 2)) == [(k, k * k) for k in range(6)]
     assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_workers_that_always_die_are_given_up() -> None:
     with pytest.raises(RuntimeError, match="type --workers 1"):
-        list(spread(_dies, range(3), 2))
+        list(parallel_map(_dies, range(3), 2))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_error_in_the_work_ends_it(workers: int) -> None:
     with pytest.raises(ValueError, match="found 0"):
-        list(spread(_fails, [0], workers))
+        list(parallel_map(_fails, [0], workers))
 
 
 def _marks(folder: Path, k: int) -> int:
@@ -63,7 +63,7 @@ def _marks(folder: Path, k: int) -> int:
 
 
 def test_what_nobody_waits_for_any_more_is_not_done(tmp_path: Path) -> None:
-    work = spread(partial(_marks, tmp_path), range(100), 2)
+    work = parallel_map(partial(_marks, tmp_path), range(100), 2)
     next(work)
     work.close()  # type: ignore[attr-defined]
     assert 1 <= len(list(tmp_path.iterdir())) < 20
@@ -120,4 +120,4 @@ def test_ctrl_c_ends_workers_without_a_word(
 
 
 def _spread_sleepers(folder: Path) -> None:
-    list(spread(partial(_sleeps, folder), range(2), 2))
+    list(parallel_map(partial(_sleeps, folder), range(2), 2))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from caldrive.parallel.ray_cluster import spread_over_cluster
+from caldrive.parallel.ray_cluster import cluster_map
 
 needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
 
@@ -30,7 +30,7 @@ def _dies_at_first(folder: Path, k: int) -> int:
 
 @needs_ray
 def test_all_work_is_done_once_though_a_worker_dies(tmp_path: Path) -> None:
-    found = sorted(spread_over_cluster(partial(_dies_at_first, tmp_path), range(5), 2, "local"))
+    found = sorted(cluster_map(partial(_dies_at_first, tmp_path), range(5), 2, "local"))
     assert found == [(k, k * k) for k in range(5)]
     assert [path.name for path in tmp_path.iterdir()] == ["died-1"]
 
@@ -42,16 +42,16 @@ def _fails(k: int) -> int:
 @needs_ray
 def test_an_error_in_the_work_is_the_works_own() -> None:
     with pytest.raises(ValueError, match=r"^found 0$"):
-        list(spread_over_cluster(_fails, [0], 2, "local"))
+        list(cluster_map(_fails, [0], 2, "local"))
 
 
 @needs_ray
 def test_a_cluster_that_is_not_there_is_named() -> None:
     with pytest.raises(ValueError, match="found no Ray cluster at auto"):
-        list(spread_over_cluster(_square, range(2), 2, "auto"))
+        list(cluster_map(_square, range(2), 2, "auto"))
 
 
 def test_without_ray_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(RuntimeError, match=r"pip install 'caldrive\[ray\]'"):
-        next(spread_over_cluster(_square, range(2), 2, "local"))
+        next(cluster_map(_square, range(2), 2, "local"))

@@ -53,9 +53,9 @@ def step(
     return Step(observation, Truth(1.0, ego, Affordances()), decision.control, decision)
 
 
-def panel(minimap: MiniMap, one: Step, truth: bool = False) -> Image:
+def panel(minimap: MiniMap, step: Step, truth: bool = False) -> Image:
     """The part under the camera's picture, left of the map."""
-    return Hud("a drive", 60.0, minimap, truth).draw(VIEW, one, [])[CAMERA.height :, :MAP_LEFT]
+    return Hud("a drive", 60.0, minimap, truth).draw(VIEW, step, [])[CAMERA.height :, :MAP_LEFT]
 
 
 def count(image: Image, color: tuple[int, int, int]) -> int:
@@ -116,8 +116,8 @@ def test_a_close_car_fills_its_gauge(minimap: MiniMap) -> None:
 
 
 def test_truth_stands_beside_only_where_it_is_asked_for(minimap: MiniMap) -> None:
-    one = step(Affordances(hazard_stop=1.0))
-    assert (panel(minimap, one, truth=True) != panel(minimap, one)).any()
+    hazard = step(Affordances(hazard_stop=1.0))
+    assert (panel(minimap, hazard, truth=True) != panel(minimap, hazard)).any()
 
 
 def test_affordances_that_are_no_numbers_can_be_drawn(minimap: MiniMap) -> None:
@@ -136,9 +136,9 @@ def test_the_map_shows_route_goal_and_the_ego_where_they_are(minimap: MiniMap) -
 
 
 def test_an_infraction_is_written_across_the_picture_for_a_while(minimap: MiniMap) -> None:
-    hud, one = Hud("a drive", 60.0, minimap, truth=False), step()
-    fresh = hud.draw(VIEW, one, [Infraction(InfractionKind.SIDEWALK, 0.5, 0.0, 0.0)])
-    stale = hud.draw(VIEW, one, [Infraction(InfractionKind.SIDEWALK, -9.0, 0.0, 0.0)])
+    hud = Hud("a drive", 60.0, minimap, truth=False)
+    fresh = hud.draw(VIEW, step(), [Infraction(InfractionKind.SIDEWALK, 0.5, 0.0, 0.0)])
+    stale = hud.draw(VIEW, step(), [Infraction(InfractionKind.SIDEWALK, -9.0, 0.0, 0.0)])
     assert count(fresh[: CAMERA.height], RED) > 1000
     assert count(stale[: CAMERA.height], RED) == 0
 

@@ -1,8 +1,9 @@
 """Agents by name: what makes each one, which camera it wants, and what its results depend on.
 
 Beside the names in AGENTS, `--agent` takes what an installed package offers in the entry-point group `caldrive.agents`,
-`package.module:Class` and `file.py:Class`. Such a class is an `interfaces.Agent`; its maker is given `model`, `cap` and
-`dt` where it has parameters of these names.
+`package.module:Class` and `file.py:Class`. Such a class is an `interfaces.Agent`. Its maker is given `model` (a path or
+None), `controller` (an `interfaces.Controller`), `cap` (km/h or None) and `dt` (s) where it has parameters of these
+names; its attribute `camera` says which camera it wants.
 """
 
 from __future__ import annotations
@@ -28,17 +29,16 @@ GROUP = "caldrive.agents"
 
 @dataclass(frozen=True)
 class AgentEntry:
-    """A row of the registry.
-
-    make: the agent for settings, the seconds of a step, and, for the privileged only, where the truth comes from.
-    camera: the camera that it wants, None where it looks at no image. provenance: what results depend on beside the
-    settings. privileged: it knows the truth, and is no agent under test.
-    """
+    """A row of the registry."""
 
     make: Callable[[AgentSettings, float, TruthSource | None], Agent]
+    """The agent for settings, the seconds of a step, and, for the privileged only, where the truth comes from."""
     camera: Callable[[AgentSettings], CameraConfig | None]
+    """The camera that it wants, None where it looks at no image."""
     provenance: Callable[[AgentSettings], dict[str, Any]]
+    """What results depend on beside the settings."""
     privileged: bool = False
+    """Whether it knows the truth, and so is no agent under test."""
 
 
 def model_path(model: Path | None) -> Path:
@@ -52,7 +52,7 @@ def model_path(model: Path | None) -> Path:
 
 
 def make_cal(settings: AgentSettings, dt: float, threads: int | None = 1) -> CALAgent:
-    """The agent that drives by a network. threads: how many it may use."""
+    """The agent that drives by a network. dt: seconds of a step. threads: how many it may use, None for all cores."""
     from caldrive.agents.cal import CALAgent
     from caldrive.perception.inference.predictor import NetworkPerception
 
@@ -83,8 +83,10 @@ def _make_oracle(settings: AgentSettings, dt: float, truth: TruthSource | None) 
 
 
 AGENTS: dict[str, AgentEntry] = {
-    "cal": AgentEntry(lambda settings, dt, _: make_cal(settings, dt), _cal_camera, _cal_provenance),
-    "oracle": AgentEntry(_make_oracle, lambda _: None, lambda _: {}, privileged=True),
+    "cal": AgentEntry(
+        make=lambda settings, dt, _: make_cal(settings, dt), camera=_cal_camera, provenance=_cal_provenance
+    ),
+    "oracle": AgentEntry(make=_make_oracle, camera=lambda _: None, provenance=lambda _: {}, privileged=True),
 }
 
 
@@ -94,19 +96,23 @@ def agent_entry(name: str) -> AgentEntry:
         return AGENTS[name]
     plugin = load_plugin(name, "--agent") if is_plugin(name) else from_entry_point(GROUP, name)
     if plugin is None:
-        known = ", ".join([*AGENTS, *offered(GROUP)])
+        names = ", ".join([*AGENTS, *offered(GROUP)])
         raise ValueError(
-            f"found agent {name!r}, wanted one of {known}, or your own class: "
+            f"found agent {name!r}, wanted one of {names}, or your own class: "
             "type --agent oracle, or --agent FILE.py:CLASS"
         )
     return _plugin_entry(plugin)
 
 
 def _plugin_entry(plugin: Plugin) -> AgentEntry:
-    """A row for somebody's own class. Its attribute `camera` says which camera it wants."""
+    """A row for somebody's own class."""
 
     def make(settings: AgentSettings, dt: float, truth: TruthSource | None) -> Agent:
-        agent: Agent = plugin.build(model=settings.model, cap=settings.cap, dt=dt)
+        _require_taken(plugin, settings)
+        options: dict[str, Any] = {"model": settings.model, "cap": settings.cap, "dt": dt}
+        if plugin.takes("controller"):
+            options["controller"] = make_controller(settings.controller, settings.cap, dt)
+        agent: Agent = plugin.build(**options)
         if not callable(getattr(agent, "act", None)):
             raise ValueError(
                 f"found that {plugin.name} has no method act, wanted act(observation) that returns a Control: add it"
@@ -114,17 +120,40 @@ def _plugin_entry(plugin: Plugin) -> AgentEntry:
         return agent
 
     def provenance(settings: AgentSettings) -> dict[str, Any]:
-        model = {"model": file_digest(settings.model)} if settings.model and plugin.takes("model") else {}
+        _require_taken(plugin, settings)
+        model = {"model": file_digest(settings.model)} if settings.model else {}
         return {"agent_source": plugin.source} | model
 
-    return AgentEntry(make, lambda _: getattr(plugin.make, "camera", CameraConfig()), provenance)
+    return AgentEntry(make=make, camera=lambda _: _plugin_camera(plugin), provenance=provenance)
+
+
+def _plugin_camera(plugin: Plugin) -> CameraConfig | None:
+    """The camera that a class asks for; without an attribute `camera` the usual one. Raises ValueError for nonsense."""
+    camera = getattr(plugin.make, "camera", CameraConfig())
+    if not isinstance(camera, CameraConfig | None):
+        raise ValueError(
+            f"found that {plugin.name} has camera {camera!r}, wanted a CameraConfig or None: "
+            "set it to caldrive.CameraConfig(width=200, height=88)"
+        )
+    return camera
+
+
+def _require_taken(plugin: Plugin, settings: AgentSettings) -> None:
+    """Raises ValueError where settings name a model or a controller that the class would never see."""
+    usual = AgentSettings()
+    for name in ("model", "controller"):
+        if getattr(settings, name) != getattr(usual, name) and not plugin.takes(name):
+            raise ValueError(
+                f"found --{name} {getattr(settings, name)}, but {plugin.name} takes none: leave --{name} out, "
+                f"or give its __init__ a parameter {name}"
+            )
 
 
 def provenance(settings: AgentSettings) -> dict[str, Any]:
-    """What results depend on in the process that drives, beside its settings."""
-    found = {"model": None, "precision": None, "agent_source": None}
-    return (
-        found
-        | {"controller_source": controller_source(settings.controller)}
-        | agent_entry(settings.agent).provenance(settings)
-    )
+    """What results depend on in the process that drives, beside its settings: digests of the network, of the agent's
+    code and of the controller's, and the network's precision; None for what there is not."""
+    return {
+        "model": None, "precision": None, "agent_source": None,
+        "controller_source": controller_source(settings.controller),
+        **agent_entry(settings.agent).provenance(settings),
+    }  # fmt: skip

@@ -14,7 +14,7 @@ class AgentSettings:
     """Who drives: cal sees the camera image only, oracle knows the truth; or your own: package.module:Class or
     file.py:Class."""
     model: Path | None = None
-    """The network of cal, a .safetensors file; without it the one in the package."""
+    """The network of cal, a .safetensors file; without it the one in the package. Your own class may take it, too."""
     controller: str = "default"
     """default, paper (the laws as printed), a .toml file of constants, package.module:Class or file.py:Class."""
     cap: float | None = None

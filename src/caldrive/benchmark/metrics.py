@@ -1,4 +1,4 @@
-"""What a suite's episodes say together: pure functions over results (tables 1 and 2 of the paper)."""
+"""Metrics of a whole suite: pure functions over the results of its trials (tables 1 and 2 of the paper)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from caldrive.benchmark.behaviour import NAMES
-from caldrive.benchmark.suites import Driven
+from caldrive.affordances import SPECS
+from caldrive.benchmark.suites import TrialResult
 from caldrive.results import InfractionKind, Outcome
 
 Z95 = 1.959964  # of a normal distribution, two-sided
@@ -21,19 +21,24 @@ PENALTIES = {
 
 @dataclass(frozen=True)
 class Cell:
-    """A task in a condition: episodes, successes, those of them without an infraction of one's own fault, share of the
-    routes covered, and the driving score in [0, 100]."""
+    """A cell of the success table: a task in a condition."""
 
     condition: str
     task: str
     episodes: int
+    """How many were driven."""
     successes: int
+    """How many reached their goal in time."""
     clean: int
+    """How many of these did so without an infraction of their own fault."""
     completion: float
+    """Mean share of the routes that was covered, in [0, 1]."""
     score: float
+    """Mean driving score, in [0, 100]."""
 
     @property
     def percent(self) -> float:
+        """The success rate in percent."""
         return 100 * self.successes / self.episodes
 
     @property
@@ -44,7 +49,7 @@ class Cell:
 
 
 def wilson(successes: int, n: int) -> tuple[float, float]:
-    """Wilson's 95 % score interval of a share."""
+    """Wilson's 95 % score interval of a share, both ends in [0, 1]."""
     if n == 0:
         return 0.0, 1.0
     share, z = successes / n, Z95**2 / n
@@ -53,78 +58,84 @@ def wilson(successes: int, n: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def cells(driven: Iterable[Driven]) -> list[Cell]:
+def cells(results: Iterable[TrialResult]) -> list[Cell]:
     """One for each condition and task, in the order of their first episodes."""
-    groups: dict[tuple[str, str], list[Driven]] = {}
-    for one in driven:
-        groups.setdefault((one.trial.condition, one.trial.scenario.task), []).append(one)
+    groups: dict[tuple[str, str], list[TrialResult]] = {}
+    for result in results:
+        groups.setdefault((result.trial.condition, result.trial.scenario.task), []).append(result)
     return [_cell(condition, task, members) for (condition, task), members in groups.items()]
 
 
-def _cell(condition: str, task: str, members: Sequence[Driven]) -> Cell:
-    n = len(members)
+def _cell(condition: str, task: str, members: Sequence[TrialResult]) -> Cell:
     return Cell(
-        condition,
-        task,
-        n,
-        sum(one.result.outcome is Outcome.SUCCESS for one in members),
-        sum(clean(one) for one in members),
-        sum(completion(one) for one in members) / n,
-        sum(driving_score(one) for one in members) / n,
+        condition=condition,
+        task=task,
+        episodes=len(members),
+        successes=sum(succeeded(member) for member in members),
+        clean=sum(is_clean(member) for member in members),
+        completion=sum(route_completion(member) for member in members) / len(members),
+        score=sum(driving_score(member) for member in members) / len(members),
     )
 
 
-def clean(one: Driven) -> bool:
+def succeeded(result: TrialResult) -> bool:
+    """Whether an episode reached its goal in time."""
+    return result.episode.outcome is Outcome.SUCCESS
+
+
+def is_clean(result: TrialResult) -> bool:
     """Whether an episode reached its goal without a collision, red light, opposite lane or sidewalk of its own
     fault."""
-    return one.result.outcome is Outcome.SUCCESS and not any(broken.at_fault for broken in one.result.infractions)
+    return succeeded(result) and not any(infraction.at_fault for infraction in result.episode.infractions)
 
 
-def completion(one: Driven) -> float:
-    """Share of the route covered."""
-    if one.result.outcome is Outcome.SUCCESS:
+def route_completion(result: TrialResult) -> float:
+    """Share of the route covered, in [0, 1]."""
+    if succeeded(result):
         return 1.0
-    return min(1.0, max(0.0, one.result.route_done / one.result.route_length))
+    return min(1.0, max(0.0, result.episode.route_done / result.episode.route_length))
 
 
-def driving_score(one: Driven) -> float:
-    """Leaderboard 2.1's driving score in [0, 100]: completion, less the share of time off the lane, over one and the
-    infractions' coefficients."""
-    broken = sum(PENALTIES.get(infraction.kind, 0.0) for infraction in one.result.infractions if infraction.at_fault)
-    off_lane = float(one.figures.get("off_lane", 0.0))
-    return 100 * completion(one) * (1 - off_lane) / (1 + broken)
+def driving_score(result: TrialResult) -> float:
+    """Leaderboard 2.1's driving score in [0, 100]: route completion, less the share of time off the lane, over one and
+    the infractions' coefficients."""
+    infractions = (infraction for infraction in result.episode.infractions if infraction.at_fault)
+    penalty = sum(PENALTIES.get(infraction.kind, 0.0) for infraction in infractions)
+    off_lane = float(result.metrics.get("off_lane", 0.0))
+    return 100 * route_completion(result) * (1 - off_lane) / (1 + penalty)
 
 
 @dataclass(frozen=True)
-class Rate:
+class InfractionRate:
     """How often an infraction of a kind was committed over a distance."""
 
     kind: InfractionKind
     count: int
     km: float
+    """The distance driven."""
 
     @property
     def km_between(self) -> str:
-        """Kilometres between two, as table 2 says it: `>` where none occurred."""
+        """Kilometres between two, as table 2 gives it: `>` where none occurred."""
         return f"> {self.km:.1f}" if self.count == 0 else f"{self.km / self.count:.2f}"
 
 
-def rates(driven: Sequence[Driven]) -> list[Rate]:
+def infraction_rates(results: Sequence[TrialResult]) -> list[InfractionRate]:
     """Kilometres driven and infractions of each kind (table 2); collisions that others cause do not count."""
-    km = sum(one.result.distance for one in driven) / 1000
-    broken = [infraction for one in driven for infraction in one.result.infractions if infraction.at_fault]
-    return [Rate(kind, sum(one.kind is kind for one in broken), km) for kind in InfractionKind]
+    km = sum(result.episode.distance for result in results) / 1000
+    kinds = [i.kind for result in results for i in result.episode.infractions if i.at_fault]
+    return [InfractionRate(kind=kind, count=kinds.count(kind), km=km) for kind in InfractionKind]
 
 
-def comfort(driven: Sequence[Driven]) -> dict[str, float]:
-    """Figures of supplement 3.2 over all episodes: median of the episodes' median centre-line distances in m, and, each
-    episode weighted by its time, RMS jerks in m/s³ and the share of time within nuPlan's bounds."""
-    drives = [(one.result.comfort, one.result.duration) for one in driven]
+def mean_comfort(results: Sequence[TrialResult]) -> dict[str, float]:
+    """The metrics of supplement 3.2 over all episodes: median of the episodes' median centre-line distances in m, and,
+    each episode weighted by its time, RMS jerks in m/s³ and the share of time within nuPlan's bounds."""
+    drives = [(result.episode.comfort, result.episode.duration) for result in results]
 
     def mean(name: str, power: int, weights: Iterable[float]) -> float:
-        weighed = [(c[name] ** power, w) for (c, _), w in zip(drives, weights, strict=True)]
-        whole = sum(w for _, w in weighed)
-        return (sum(v * w for v, w in weighed) / whole) ** (1 / power) if whole else 0.0
+        weighted = [(c[name] ** power, w) for (c, _), w in zip(drives, weights, strict=True)]
+        total = sum(w for _, w in weighted)
+        return (sum(v * w for v, w in weighted) / total) ** (1 / power) if total else 0.0
 
     return {
         "center_distance": median(c["center_distance"] for c, _ in drives) if drives else 0.0,
@@ -135,19 +146,20 @@ def comfort(driven: Sequence[Driven]) -> dict[str, float]:
     }
 
 
-def reds(driven: Sequence[Driven]) -> tuple[int, int]:
-    """Red lights that the car stopped for or ran, and those it ran."""
-    obeyed = sum(int(one.figures["reds_obeyed"]) for one in driven)
-    run = sum(i.kind is InfractionKind.RED_LIGHT for one in driven for i in one.result.infractions)
+def red_light_counts(results: Sequence[TrialResult]) -> tuple[int, int]:
+    """Red lights that the car stopped for or ran, and those that it ran."""
+    obeyed = sum(int(result.metrics["reds_obeyed"]) for result in results)
+    run = sum(i.kind is InfractionKind.RED_LIGHT for result in results for i in result.episode.infractions)
     return obeyed + run, run
 
 
-def errors(driven: Sequence[Driven]) -> dict[str, float]:
-    """What the affordances were off by while driving, weighted by time: shares of frames for the discrete ones, mean
-    absolute errors in SI units for the others."""
-    found: dict[str, float] = {}
-    for name in NAMES:
-        known = [one for one in driven if one.figures.get(f"error/{name}") is not None]
-        if whole := sum(one.result.duration for one in known):
-            found[name] = sum(one.figures[f"error/{name}"] * one.result.duration for one in known) / whole
-    return found
+def mean_errors(results: Sequence[TrialResult]) -> dict[str, float]:
+    """How far the affordances were off while driving, weighted by time, without those that are never known: shares of
+    wrong steps for the discrete ones, mean absolute errors in SI units for the others."""
+    means: dict[str, float] = {}
+    for spec in SPECS:
+        metric = f"error/{spec.name}"
+        known = [result for result in results if result.metrics.get(metric) is not None]
+        if seconds := sum(result.episode.duration for result in known):
+            means[spec.name] = sum(result.metrics[metric] * result.episode.duration for result in known) / seconds
+    return means

@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from caldrive.benchmark.run_folder import RunFolder, as_driven
+from caldrive.benchmark.run_folder import RunFolder, trial_result
 from caldrive.benchmark.suites import Trial
 from caldrive.checks import require_writable_file
 from caldrive.datatypes import Step
@@ -21,15 +21,18 @@ from caldrive.visualization.episode_video import EpisodeFilm, Shown, VideoWriter
 
 @dataclass(frozen=True)
 class Replay:
-    """An episode driven again: how it went, whether as before, and its video."""
+    """An episode driven again."""
 
     result: EpisodeResult
+    """How it went."""
     same: bool
+    """Whether it went as before; false where there is no earlier result."""
     video: Path
+    """Its video (MP4)."""
 
 
 def replay(path: Path, key: str, out: Path, progress: Progress = silent) -> Replay:
-    """Drives the episode of a benchmark's folder again, exactly, and writes its video.
+    """Drives the episode of a run's folder again, exactly, and writes its video.
 
     Raises ValueError where there is no such run or episode.
     """
@@ -37,15 +40,14 @@ def replay(path: Path, key: str, out: Path, progress: Progress = silent) -> Repl
     folder = RunFolder(path)
     trial = next((trial for trial in folder.trials if trial.key == key), None)
     if trial is None:
-        raise ValueError(
-            f"found no episode {key!r} in {folder.about['suite']}, wanted one like {folder.trials[0].key}: type its key"
-        )
+        suite, example = folder.description["suite"], folder.trials[0].key
+        raise ValueError(f"found no episode {key!r} in {suite}, wanted one like {example}: type its key")
     line = folder.lines().get(key)
     if line is not None:
-        as_driven(trial, line)  # refuses another episode of this name
+        trial_result(trial, line)  # refuses another episode of this name
     result = _film(folder, trial, out, progress)
     same = line is not None and line["result"] == json.loads(json.dumps(result_values(result)))
-    return Replay(result, same, out)
+    return Replay(result=result, same=same, video=out)
 
 
 def _film(folder: RunFolder, trial: Trial, out: Path, progress: Progress) -> EpisodeResult:

@@ -1,4 +1,4 @@
-"""A benchmark's folder: what drove it (run.json), and a line for each episode that is done (results.jsonl).
+"""A run's folder: what drove it (run.json), and a line for each episode that is done (results.jsonl).
 
 Lines are appended and never changed, so a run that was killed holds all that it had finished. A folder takes results of
 one agent, model, code and precision only. Results that are kept for others may be compressed (results.jsonl.gz).
@@ -21,21 +21,21 @@ from typing import Any, NotRequired, TypedDict
 from caldrive.agents.registry import provenance
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.settings import BenchmarkSettings
-from caldrive.benchmark.suites import SUITES, Driven, Trial, from_json, suite
+from caldrive.benchmark.suites import SUITES, Trial, TrialResult, from_json, suite
 from caldrive.files import json_line, read_json, write_whole
 from caldrive.provenance import code_version, machine_name
 from caldrive.results import result_from_values
 from caldrive.world.roads.towns import TOWNS
 
 RESULTS, RUN = "results.jsonl", "run.json"
-PACKED = RESULTS + ".gz"
+COMPRESSED = RESULTS + ".gz"
 
 
-class About(TypedDict):
+class RunDescription(TypedDict):
     """What run.json says.
 
     suite_content, agent_source, controller_source: digests of files of one's own. model_file: the path of the network,
-    where it is not the package's."""
+    where it is not the package's. began: the time in UTC."""
 
     suite: str
     suite_content: str | None
@@ -55,8 +55,8 @@ class About(TypedDict):
     workers: int
 
 
-class Line(TypedDict):
-    """What a line of results.jsonl says of an episode."""
+class ResultLine(TypedDict):
+    """What a line of results.jsonl says of an episode. figures: those of `EpisodeMetrics`, by name."""
 
     key: str
     result: dict[str, Any]
@@ -65,47 +65,51 @@ class Line(TypedDict):
 
 @dataclass(frozen=True)
 class EpisodeRecord:
-    """What is kept of a trial: its line, its files by their names, and what drove it (`driven_with`)."""
+    """What is kept of a trial that was driven."""
 
     line: dict[str, Any]
+    """A `ResultLine`."""
     files: dict[str, bytes]
-    driven_with: dict[str, Any]
+    """Its artifacts by their names in the folder."""
+    provenance: dict[str, Any]
+    """What drove it, as `driver_provenance` says."""
 
 
-def driven_with(driver: AgentSettings) -> dict[str, Any]:
+def driver_provenance(driver: AgentSettings) -> dict[str, Any]:
     """What results depend on in the process that drives: code, network, precision, and files of one's own."""
     return {"code": code_version(), **provenance(driver)}
 
 
-def suite_content(path: Path) -> str:
+def suite_digest(path: Path) -> str:
     """Tells a suite of one's own from any other: a digest of its file and of the maps that it drives in."""
     maps = sorted({trial.scenario.town for trial in from_json(path)} - set(TOWNS))
     content = b"".join(part.read_bytes() for part in (path, *map(Path, maps)))
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def identity(settings: BenchmarkSettings, ours: dict[str, Any]) -> dict[str, Any]:
-    """What a folder's results depend on. ours: this process' `driven_with`."""
-    own, driver = Path(settings.suite) if settings.suite not in SUITES else None, settings.driver
+def run_identity(settings: BenchmarkSettings, driven_by: dict[str, Any]) -> dict[str, Any]:
+    """What a folder's results depend on. driven_by: the `driver_provenance` of this process."""
+    own_suite, driver = Path(settings.suite) if settings.suite not in SUITES else None, settings.driver
     return {
-        "suite": str(own.resolve()) if own else settings.suite, "suite_content": suite_content(own) if own else None,
+        "suite": str(own_suite.resolve()) if own_suite else settings.suite,
+        "suite_content": suite_digest(own_suite) if own_suite else None,
         "agent": driver.agent, "controller": driver.controller, "cap": driver.cap,
-        "time_limit": settings.time_limit, "seed": settings.seed, **ours,
+        "time_limit": settings.time_limit, "seed": settings.seed, **driven_by,
     }  # fmt: skip
 
 
 class RunFolder:
-    """A folder that has a run.json. about: what it says."""
+    """A folder that has a run.json. description: what it says, a `RunDescription`."""
 
     def __init__(self, path: Path) -> None:
         """Raises ValueError where there is no run, or its description is damaged."""
         self.path = path
-        self.about: dict[str, Any] = _read_about(path)
+        self.description: dict[str, Any] = _read_description(path)
 
     @classmethod
-    def claim(cls, settings: BenchmarkSettings, ours: dict[str, Any]) -> RunFolder:
-        """The folder for settings' results, begun or taken up. Raises ValueError where it holds another run's."""
-        path, wanted = settings.out, identity(settings, ours)
+    def claim(cls, settings: BenchmarkSettings, driven_by: dict[str, Any]) -> RunFolder:
+        """The folder for settings' results, new or taken up again. Raises ValueError where it holds another run's."""
+        path, identity = settings.out, run_identity(settings, driven_by)
         if not (path / RUN).is_file():
             if (path / RESULTS).is_file():
                 raise ValueError(f"found results in {path}, but no {RUN} that says whose: give another --out")
@@ -114,28 +118,29 @@ class RunFolder:
                 "began": datetime.now(UTC).isoformat(timespec="seconds"),
                 "machine": machine_name(), "workers": settings.workers,
             }  # fmt: skip
-            write_whole(path / RUN, (json.dumps(wanted | more, indent=2) + "\n").encode())
+            write_whole(path / RUN, (json.dumps(identity | more, indent=2) + "\n").encode())
         folder = cls(path)
-        for name, value in wanted.items():
-            if folder.about.get(name) != value:
+        for name, value in identity.items():
+            if folder.description.get(name) != value:
                 raise ValueError(
-                    f"found in {path} results with {name} {folder.about.get(name)}, wanted {value}: give another --out"
+                    f"found in {path} results with {name} {folder.description.get(name)}, wanted {value}: "
+                    "give another --out"
                 )
         return folder
 
     @property
     def driver(self) -> AgentSettings:
         """Who drove."""
-        about = self.about
+        about = self.description
         model = Path(about["model_file"]) if about["model_file"] else None
         return AgentSettings(agent=about["agent"], model=model, controller=about["controller"], cap=about["cap"])
 
     @cached_property
     def trials(self) -> list[Trial]:
         """The suite's trials. Raises ValueError where the file of a suite of one's own is not what it was."""
-        about = self.about
+        about = self.description
         if about["suite_content"] is not None:
-            _require_same(Path(about["suite"]), about["suite_content"])
+            _require_same_suite(Path(about["suite"]), about["suite_content"])
         return suite(about["suite"], about["seed"], about["time_limit"])
 
     def lines(self) -> dict[str, dict[str, Any]]:
@@ -144,20 +149,20 @@ class RunFolder:
 
     def missing(self) -> list[Trial]:
         """The trials that are not driven yet."""
-        known = self.lines()
-        return [trial for trial in self.trials if trial.key not in known]
+        done = self.lines()
+        return [trial for trial in self.trials if trial.key not in done]
 
-    def driven(self) -> list[Driven]:
+    def results(self) -> list[TrialResult]:
         """The results, in the suite's order. Raises ValueError where a line is of an older suite's trial."""
         lines = self.lines()
-        return [as_driven(trial, lines[trial.key]) for trial in self.trials if trial.key in lines]
+        return [trial_result(trial, lines[trial.key]) for trial in self.trials if trial.key in lines]
 
-    def keep(self, record: EpisodeRecord) -> None:
+    def save(self, record: EpisodeRecord) -> None:
         """Writes an episode's files, and last its line. Raises ValueError where a worker drove with something else."""
-        for name, value in record.driven_with.items():
-            if self.about.get(name) != value:
+        for name, value in record.provenance.items():
+            if self.description.get(name) != value:
                 raise ValueError(
-                    f"found a worker with {name} {value}, wanted {self.about.get(name)}: "
+                    f"found a worker with {name} {value}, wanted {self.description.get(name)}: "
                     "install the same caldrive and model on machines of one kind"
                 )
         for name, content in record.files.items():
@@ -165,51 +170,51 @@ class RunFolder:
         _append(self.path / RESULTS, record.line)
 
 
-def as_driven(trial: Trial, line: dict[str, Any]) -> Driven:
+def trial_result(trial: Trial, line: dict[str, Any]) -> TrialResult:
     """A trial and its line. Raises ValueError where the line is of an older suite's trial of this name."""
     result = result_from_values(line["result"])
     if result.scenario != trial.scenario:
         raise ValueError(
             f"found that {trial.key} was another episode when it was driven: type caldrive benchmark --out ANOTHER"
         )
-    return Driven(trial, result, line["figures"])
+    return TrialResult(trial=trial, episode=result, metrics=line["figures"])
 
 
-def _read_about(folder: Path) -> dict[str, Any]:
+def _read_description(folder: Path) -> dict[str, Any]:
     path = folder / RUN
     if not path.is_file():
         raise ValueError(f"found no {RUN} in {folder}, wanted a benchmark's folder: type caldrive benchmark --out DIR")
     try:
-        return dict(read_json(path.read_bytes(), About))
+        return dict(read_json(path.read_bytes(), RunDescription))
     except ValueError as error:
         raise ValueError(
             f"found that {path} is damaged ({error}), wanted a run's description: type caldrive benchmark --out ANOTHER"
         ) from error
 
 
-def _require_same(path: Path, content: str) -> None:
+def _require_same_suite(path: Path, digest: str) -> None:
     try:
-        now = suite_content(path)
+        now = suite_digest(path)
     except (ValueError, OSError) as error:
         now = str(error)
-    if now != content:
+    if now != digest:
         raise ValueError(
             f"found that {path} or a map in it is not what was driven ({now}), wanted "
-            f"{content}: put it back, or type caldrive benchmark --out ANOTHER"
+            f"{digest}: put it back, or type caldrive benchmark --out ANOTHER"
         )
 
 
 def read_lines(folder: Path) -> dict[str, dict[str, Any]]:
     """The lines of a folder's results by trial, compressed or not. One that was being written when the run was killed
-    is no line. Raises ValueError for a damaged one."""
+    does not count. Raises ValueError for a damaged one."""
     path = folder / RESULTS
     try:
-        if not path.is_file() and (folder / PACKED).is_file():
-            path = folder / PACKED
+        if not path.is_file() and (folder / COMPRESSED).is_file():
+            path = folder / COMPRESSED
             text = gzip.decompress(path.read_bytes())
         else:
             text = path.read_bytes() if path.is_file() else b""
-        lines = [_line(one) for one in text.split(b"\n")[:-1]]
+        lines = [_read_line(line) for line in text.split(b"\n")[:-1]]
         if twice := [key for key, n in Counter(line["key"] for line in lines).items() if n > 1]:
             raise ValueError(f"{twice[0]} is there twice")
         return {line["key"]: line for line in lines}
@@ -217,9 +222,9 @@ def read_lines(folder: Path) -> dict[str, dict[str, Any]]:
         raise ValueError(f"found a damaged line in {path} ({error}), wanted results: give another --out") from error
 
 
-def _line(text: bytes) -> dict[str, Any]:
-    """One line, which holds what results hold."""
-    line = read_json(text, Line)
+def _read_line(text: bytes) -> dict[str, Any]:
+    """One line, as a `ResultLine`. Raises ValueError for anything else."""
+    line = read_json(text, ResultLine)
     result_from_values(line["result"])
     for name, value in line["figures"].items():
         if value is None and "/" not in name:  # of affordances nothing is known where nothing was seen

@@ -1,6 +1,6 @@
 """The runner: drives a suite with several workers, and can be killed at any moment.
 
-What a trial gives depends on the trial and on what drives only, so the lines of a run that was broken off ten times are
+A trial's result depends on the trial and on who drives only, so the lines of a run that was broken off ten times are
 those of an unbroken one, in another order.
 """
 
@@ -12,20 +12,21 @@ from functools import lru_cache, partial
 from typing import Any
 
 from caldrive.agents.settings import AgentSettings
-from caldrive.benchmark.behaviour import Behaviour
-from caldrive.benchmark.evidence import Evidence
-from caldrive.benchmark.reuse import driven_elsewhere
-from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, driven_with
+from caldrive.benchmark.artifacts import EpisodeArtifacts
+from caldrive.benchmark.episode_metrics import EpisodeMetrics
+from caldrive.benchmark.reuse import reusable_records
+from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, driver_provenance
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import SUITES, Trial, suite
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_writable_folder
 from caldrive.datatypes import Step
 from caldrive.driving.referee import Referee
-from caldrive.driving.rollout import run_episode
+from caldrive.driving.rollout import AgentError, run_episode
 from caldrive.driving.setup import set_up
-from caldrive.files import held
-from caldrive.parallel.processes import spread
-from caldrive.parallel.ray_cluster import require_ray, spread_over_cluster
+from caldrive.files import locked_folder
+from caldrive.interfaces import Agent, World
+from caldrive.parallel.processes import parallel_map
+from caldrive.parallel.ray_cluster import cluster_map, require_ray
 from caldrive.results import plain, result_values
 from caldrive.scenarios import Scenario
 from caldrive.world.roads.route import plan_route
@@ -36,64 +37,72 @@ from caldrive.world.traffic.vehicles import free_places
 
 
 @lru_cache(maxsize=1)
-def _set_up(driver: AgentSettings) -> Any:
+def _worker(driver: AgentSettings) -> tuple[World, Agent, dict[str, Any]]:
     """One world, agent and provenance for each process."""
-    return *set_up(driver), driven_with(driver)
+    return *set_up(driver), driver_provenance(driver)
 
 
-def _let_go(driver: AgentSettings) -> None:
+def _close_worker(driver: AgentSettings) -> None:
     """Closes the world of this process, if a trial was driven in it."""
-    if _set_up.cache_info().currsize:
-        _set_up(driver)[0].close()
-        _set_up.cache_clear()
+    if _worker.cache_info().currsize:
+        _worker(driver)[0].close()
+        _worker.cache_clear()
 
 
 def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
-    """What a worker does: drives one trial, and returns all that is kept of it."""
-    world, agent, ours = _set_up(driver)
+    """What a worker does: drives one trial, and returns all that is kept of it. Raises AgentError with its key."""
+    world, agent, provenance = _worker(driver)
     referee = Referee(trial.scenario, trial.fatal)
-    behaviour, evidence = Behaviour(), Evidence(world, referee)
+    metrics, artifacts = EpisodeMetrics(), EpisodeArtifacts(world, referee)
 
     def watch(step: Step) -> None:
-        behaviour.add(step)
-        evidence.add(step)
+        metrics.add(step)
+        artifacts.add(step)
 
-    result = run_episode(world, agent, trial.scenario, watch, referee)
-    figures = {name: plain(value) for name, value in behaviour.figures(result.infractions).items()}
+    try:
+        result = run_episode(world, agent, trial.scenario, watch, referee)
+    except AgentError as error:
+        raise AgentError(f"{error} (in episode {trial.key})") from error
+    figures = {name: plain(value) for name, value in metrics.metrics(result.infractions).items()}
     line = {"key": trial.key, "result": result_values(result), "figures": figures}
-    return EpisodeRecord(line, evidence.files(trial.key, result), ours)
+    return EpisodeRecord(line=line, files=artifacts.files(trial.key, result), provenance=provenance)
 
 
 @dataclass(frozen=True)
-class Advance:
-    """How far a run is: trials done, of how many, and whether the last one succeeded."""
+class RunProgress:
+    """How far a run is."""
 
     done: int
-    of: int
+    """Trials that are done."""
+    total: int
+    """Trials of the suite."""
     success: bool
+    """Whether the last one reached its goal."""
 
 
-def benchmark(settings: BenchmarkSettings) -> Iterator[Advance]:
+def benchmark(settings: BenchmarkSettings) -> Iterator[RunProgress]:
     """Drives the trials that a folder lacks; yields how far the run is.
 
-    Raises ValueError where a folder belongs to another run, RuntimeError where workers keep dying or Ray is missing.
+    Raises ValueError where a folder belongs to another run, AgentError where the agent fails, RuntimeError where
+    workers keep dying or Ray is missing.
     """
     known = [RunFolder(folder) for folder in settings.known]
     _check(settings)
-    ours = driven_with(settings.driver)  # looks at agent and network before there is a folder
-    with held(settings.out):
-        folder = RunFolder.claim(settings, ours)
-        for record in driven_elsewhere(known, folder.missing(), folder.about | ours):
-            folder.keep(record)
+    driven_by = driver_provenance(settings.driver)  # looks at agent and network before there is a folder
+    with locked_folder(settings.out):
+        folder = RunFolder.claim(settings, driven_by)
+        for record in reusable_records(known, folder.missing(), folder.description | driven_by):
+            folder.save(record)
         missing = folder.missing()
         done = len(folder.trials) - len(missing)
         try:
             for record in _drive(settings, partial(drive_trial, settings.driver), missing):
-                folder.keep(record)
+                folder.save(record)
                 done += 1
-                yield Advance(done, len(folder.trials), record.line["result"]["outcome"] == "success")
+                success = record.line["result"]["outcome"] == "success"
+                yield RunProgress(done=done, total=len(folder.trials), success=success)
         finally:
-            _let_go(settings.driver)
+            _close_worker(settings.driver)
 
 
 def _check(settings: BenchmarkSettings) -> None:
@@ -109,22 +118,22 @@ def _check(settings: BenchmarkSettings) -> None:
             raise ValueError(
                 f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
             )
-        _check_places(settings.suite, suite(settings.suite))
+        _check_trials(settings.suite, suite(settings.suite))
     require_writable_folder(settings.out)
 
 
-def _check_places(name: str, trials: list[Trial]) -> None:
+def _check_trials(name: str, trials: list[Trial]) -> None:
     """Refuses towns, weathers and ways that there are not, and more cars or people than there is room for."""
     for trial in trials:
         try:
-            _check_place(trial.scenario)
+            _check_scenario(trial.scenario)
         except (ValueError, OSError) as error:
             raise ValueError(
                 f"found that {trial.key} in {name} cannot be driven ({error}): change its scenario"
             ) from error
 
 
-def _check_place(scenario: Scenario) -> None:
+def _check_scenario(scenario: Scenario) -> None:
     weather(scenario.weather)
     roads = load_roads(scenario.town)
     route = plan_route(roads, scenario.start, scenario.goal)
@@ -137,7 +146,7 @@ def _drive(
 ) -> Iterator[EpisodeRecord]:
     """The trials' records as they are done, by processes of this machine or by Ray's."""
     if settings.ray is None:
-        done = spread(work, trials, settings.workers)
+        results = parallel_map(work, trials, settings.workers)
     else:
-        done = spread_over_cluster(work, trials, settings.workers, settings.ray)
-    return (record for _, record in done)
+        results = cluster_map(work, trials, settings.workers, settings.ray)
+    return (record for _, record in results)

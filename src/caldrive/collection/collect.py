@@ -17,9 +17,9 @@ from caldrive.checks import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.recorder import record_episode
 from caldrive.driving.setup import make_world
-from caldrive.files import read_json, write_whole
+from caldrive.files import locked_folder, read_json, write_whole
 from caldrive.interfaces import RecordableWorld, is_recordable
-from caldrive.parallel.processes import spread
+from caldrive.parallel.processes import parallel_map
 from caldrive.progress import Progress, silent
 from caldrive.provenance import code_version
 from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, episode_path
@@ -28,16 +28,42 @@ from caldrive.world.scene.weather import weather
 from caldrive.world.traffic import pedestrians
 from caldrive.world.traffic import vehicles as traffic
 
+LIMITS = {  # of the options that are numbers
+    "episodes": (1, 100_000), "duration": (0.1, 3600.0), "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS),
+    "seed": (0, MOST_SEED), "randomised": (0.0, 1.0), "workers": (1, MOST_WORKERS),
+}  # fmt: skip
+
+
+def collect(
+    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent
+) -> Iterator[tuple[int, int]]:
+    """Records what is missing in a folder; yields (episode, frames) as they are done.
+
+    Where a worker dies, new ones go on. Raises ValueError where the folder holds a recording with other settings or
+    another process records in it, RuntimeError where workers die again and again.
+    """
+    _check(config, workers)
+    with locked_folder(folder):
+        _claim(folder, config)
+        missing = [k for k in range(config.episodes) if not episode_path(folder, k).exists()]
+        recorded = parallel_map(partial(_record, config, folder), missing, workers)
+        try:
+            for done, episode in enumerate(recorded, start=config.episodes - len(missing) + 1):
+                progress(f"recording, {done} of {config.episodes} episodes", done / config.episodes)
+                yield episode
+        finally:
+            _close_world()
+
 
 @lru_cache(maxsize=1)
 def _world() -> RecordableWorld:
-    """This process' own."""
+    """The world of this process."""
     world = make_world()
     assert is_recordable(world)
     return world
 
 
-def _let_go() -> None:
+def _close_world() -> None:
     """Closes the world of this process, if an episode was recorded in it."""
     if _world.cache_info().currsize:
         _world().close()
@@ -45,26 +71,33 @@ def _let_go() -> None:
 
 
 def _record(config: CollectConfig, folder: Path, number: int) -> int:
+    """What a worker does: records an episode, and returns its number of frames."""
     return record_episode(_world(), config, number, folder)
 
 
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
-    limits = {
-        "episodes": (1, 100_000), "duration": (0.1, 3600.0),
-        "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS), "seed": (0, MOST_SEED), "randomised": (0.0, 1.0),
-        "workers": (1, MOST_WORKERS),
-    }  # fmt: skip
-    asked, usual = asdict(config) | {"workers": workers}, asdict(CollectConfig()) | {"workers": 2}
-    for name, (low, high) in limits.items():
-        require_within(f"--{name}", asked[name], low, high, usual[name])
+    values, usual = asdict(config) | {"workers": workers}, asdict(CollectConfig()) | {"workers": 2}
+    for name, (low, high) in LIMITS.items():
+        require_within(f"--{name}", values[name], low, high, usual[name])
     if not config.weathers:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 8 3 1 8 6")
     for number in config.weathers:
         weather(number)
     roads = load_roads(config.town)
     for name, most in {"cars": traffic.room(roads), "people": pedestrians.room(roads)}.items():
-        require_within(f"--{name}", asked[name], 0, most, min(most, usual[name]))
+        require_within(f"--{name}", values[name], 0, most, min(most, usual[name]))
+
+
+def _claim(folder: Path, config: CollectConfig) -> None:
+    """Writes down what is recorded in a folder. Raises ValueError where there are episodes of something else."""
+    manifest = folder / MANIFEST
+    wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION, "code": code_version()}))
+    if any(folder.glob("*.parquet")):
+        recorded = _read_manifest(manifest)
+        _require_same(folder, recorded, wanted)
+        wanted["episodes"] = max(n for n in (config.episodes, recorded.get("episodes")) if isinstance(n, int))
+    write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
@@ -80,44 +113,9 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         ) from error
 
 
-def _claim(folder: Path, config: CollectConfig) -> None:
-    """Writes down what is recorded in a folder. Raises ValueError where there are episodes of something else."""
-    manifest = folder / MANIFEST
-    wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION, "code": code_version()}))
-    if any(folder.glob("*.parquet")):
-        found = _read_manifest(manifest)
-        _compare(folder, found, wanted)
-        wanted["episodes"] = max(n for n in (config.episodes, found.get("episodes")) if isinstance(n, int))
-    write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
-
-
-def _compare(folder: Path, found: dict[str, Any], wanted: dict[str, Any]) -> None:
+def _require_same(folder: Path, recorded: dict[str, Any], wanted: dict[str, Any]) -> None:
     for name, value in wanted.items():
-        if name != "episodes" and found.get(name) != value:  # a recording may grow
+        if name != "episodes" and recorded.get(name) != value:  # a recording may grow
             raise ValueError(
-                f"found in {folder} a recording with {name} {found.get(name)}, wanted {value}: give another --out"
+                f"found in {folder} a recording with {name} {recorded.get(name)}, wanted {value}: give another --out"
             )
-
-
-def collect(
-    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent
-) -> Iterator[tuple[int, int]]:
-    """Records what is missing in a folder; yields (episode, frames) as they are done.
-
-    Where a worker dies, new ones go on. Raises ValueError where the folder holds a recording with other settings,
-    RuntimeError where workers die again and again.
-    """
-    _check(config, workers)
-    _claim(folder, config)
-    left = _missing(config, folder)
-    recorded = spread(partial(_record, config, folder), left, workers)
-    try:
-        for there, episode in enumerate(recorded, start=config.episodes - len(left) + 1):
-            progress(f"recording, {there} of {config.episodes} episodes", there / config.episodes)
-            yield episode
-    finally:
-        _let_go()
-
-
-def _missing(config: CollectConfig, folder: Path) -> list[int]:
-    return [k for k in range(config.episodes) if not episode_path(folder, k).exists()]

@@ -17,8 +17,8 @@ class CollectConfig:
     episodes: int = 1800
     """How many episodes the folder holds in the end."""
     duration: float = 12.0
-    """Simulated seconds of each. Short, because a new place and a new look tell most. While the car stands for long,
-    one frame in fifteen counts."""
+    """Simulated seconds of each. Short, because a new place and a new look teach most. While the car stands for long,
+    one frame in fifteen is kept."""
     cars: int = 75
     """Other cars in half of the episodes. Tailgating episodes have twice as many, the rest a third."""
     people: int = 70
@@ -30,15 +30,16 @@ class CollectConfig:
     before_turns: float = 0.5
     """Share of the episodes that begin shortly before a turn at a junction (not the tailgating ones)."""
     displaced: float = 0.3
-    """Share of the episodes that begin beside the lane's middle or turned away from it."""
+    """Share of the episodes that begin beside the middle of the lane or turned away from it."""
     randomised: float = 0.85
     """Share of the episodes in which the town looks different: other houses, trees, colours and sun along the same
     streets (domain randomisation)."""
     hidden_cars: float = 0.1
-    """Share of the episodes, of those without tailgating, in which the driver is told of no car ahead."""
+    """Share of the episodes without tailgating in which no car ahead is reported to the driver, who then has to make a
+    hazard stop."""
     tailgating: float = 0.2
-    """Share of the episodes in which the driver looks for cars and comes close to them, at 20 km/h at most and for up
-    to six times the duration."""
+    """Share of the episodes in which the driver looks for cars and stops close behind them, at 20 km/h at most and for
+    up to six times the duration."""
     width: int = 200
     """Width of the images in pixels; the preset paper takes 320."""
     height: int = 88

@@ -1,7 +1,7 @@
 """One recorded episode: oracle and controller drive from somewhere in a town, three cameras look on (section 3.1).
 
-Not every moment of a drive becomes a key frame: a car that stands tells the same until what it should stop for changes,
-and one that follows no other tells little to those who are to learn distances.
+Not every step of a drive becomes a key frame: a car that stands shows the same until what it should stop for changes,
+and one that follows no other shows little to those who are to learn distances.
 """
 
 from __future__ import annotations
@@ -14,80 +14,47 @@ from pathlib import Path
 import numpy as np
 
 from caldrive.collection.config import CollectConfig
-from caldrive.collection.perturbation import Disturbance, LateStart
+from caldrive.collection.perturbation import ControlPerturbation, DelayedStart
 from caldrive.collection.start_poses import SEARCH, begin_episode, plan_episode
 from caldrive.datatypes import Affordances, CameraConfig, Control, Observation
 from caldrive.interfaces import RecordableWorld
 from caldrive.recordings.writer import EpisodeWriter, Frame, episode_path
 
-PATIENCE = 2  # times the wanted duration that a drive may last
-BEGINNING = 6  # a tailgater's first moments are key frames, one in so many of those wanted, and later it takes a car
-MEETING = 25.0  # m; a car ahead that is nearer
-STANDING = 0.1  # m/s
-STOOD = 15  # moments that are key frames when the car comes to stand,
-RUN, EVERY = 9, 135  # and then a run of so many in so many: single ones would have no history
+MAX_DURATION = 2  # times the wanted duration that a drive may last
+FIRST_SHARE = 6  # one in so many of a tailgating drive's key frames are its first steps; later ones need a car
+NEAR_CAR = 25.0  # m; a car ahead that is nearer makes a key frame of a tailgating drive
+STANDING_SPEED = 0.1  # m/s
+STANDING_STEPS = 15  # that are key frames when the car comes to stand,
+RUN, PERIOD = 9, 135  # and then a run of so many in so many: single ones would have no history
 BASELINES = (-0.5, 0.0, 0.5)  # m, + left (section 3.1)
 MAX_YAW = math.radians(15)
+ROUTE_MARGIN = 5.0  # m before the end of the route at which the episode ends
 
 
-class KeyFrames:
-    """Says which moments of a drive are key frames, and when there are enough. wanted: how many.
+class KeyFrameSelector:
+    """Says which steps of a drive are key frames, and when there are enough.
 
-    A car that stands tells the same until what it should stop for changes. A tailgater tells at first, for the empty
-    street, and then where a car is near.
+    wanted: how many. tailgating: of such a drive, the first steps are key frames, for the empty street, and then those
+    where a car is near.
     """
 
     def __init__(self, wanted: int, tailgating: bool) -> None:
         self.wanted, self.tailgating = wanted, tailgating
-        self.most = (SEARCH if tailgating else PATIENCE) * wanted  # moments that the drive may last
-        self.taken, self._index, self._stood, self._before = 0, 0, 0, (0.0, 0.0)
+        self.max_steps = (SEARCH if tailgating else MAX_DURATION) * wanted  # that the drive may last
+        self.selected, self._index, self._standing, self._reasons = 0, 0, 0, (0.0, 0.0)
 
-    def takes(self, labels: Affordances, speed: float) -> bool:
-        """Whether the next moment is a key frame."""
+    def select(self, labels: Affordances, speed: float) -> bool:
+        """Whether the next step is a key frame; speed in m/s."""
         reasons = labels.hazard_stop, labels.red_light
-        self._stood = self._stood + 1 if speed < STANDING and reasons == self._before else 0
-        self._before = reasons
-        telling = self._stood <= STOOD or self._stood % EVERY < RUN
+        self._standing = self._standing + 1 if speed < STANDING_SPEED and reasons == self._reasons else 0
+        self._reasons = reasons
+        is_key_frame = self._standing <= STANDING_STEPS or self._standing % PERIOD < RUN
         if self.tailgating:
-            beginning = self._index < max(1, self.wanted // BEGINNING)
-            telling = telling and (beginning or labels.vehicle_distance < MEETING)
+            is_first = self._index < max(1, self.wanted // FIRST_SHARE)
+            is_key_frame = is_key_frame and (is_first or labels.vehicle_distance < NEAR_CAR)
         self._index += 1
-        self.taken += telling
-        return telling
-
-
-def _mounts(config: CollectConfig, rng: np.random.Generator) -> list[CameraConfig]:
-    """Three cameras, each turned by chance."""
-    yaws = rng.uniform(-MAX_YAW, MAX_YAW, size=len(BASELINES))
-    size = config.width, config.height
-    return [CameraConfig(*size, left=left, yaw=float(yaw)) for left, yaw in zip(BASELINES, yaws, strict=True)]
-
-
-def record_episode(world: RecordableWorld, config: CollectConfig, number: int, folder: Path) -> int:
-    """Drives and records one episode; returns its number of frames (key frames times cameras).
-
-    It ends when there are enough key frames, with the patience or the route, or when the car touches something.
-    """
-    rng = np.random.default_rng([config.seed, number])
-    plan = plan_episode(config, number, rng)
-    observation, agent = begin_episode(world, config, plan, rng)
-    mounts = _mounts(config, rng)
-    disturbance, start = Disturbance(rng), LateStart(rng)
-    frames = KeyFrames(round(config.duration / world.dt), plan.tailgating)
-    with EpisodeWriter(episode_path(folder, number), plan.scenario) as writer:
-        for index in range(frames.most):
-            wanted = frames.takes(world.truth().affordances, observation.speed)
-            clean = agent.act(observation)
-            driven = start.apply(disturbance.apply(clean, observation.speed), observation.speed)
-            if wanted:
-                pair = Controls(clean, driven)
-                for frame in _frames(world, observation, mounts, index, pair, config.semantic):
-                    writer.append(frame)
-            observation = world.step(driven)
-            truth = world.truth()
-            if frames.taken == frames.wanted or truth.contacts or truth.route_done >= truth.route_length - 5:
-                break
-    return frames.taken * len(mounts)
+        self.selected += is_key_frame
+        return is_key_frame
 
 
 @dataclass(frozen=True)
@@ -98,19 +65,56 @@ class Controls:
     driven: Control
 
 
+def record_episode(world: RecordableWorld, config: CollectConfig, number: int, folder: Path) -> int:
+    """Drives and records one episode; returns its number of frames (key frames times cameras).
+
+    It ends when there are enough key frames, when it takes too long, with the route, or when the car touches something.
+    """
+    rng = np.random.default_rng([config.seed, number])
+    plan = plan_episode(config, number, rng)
+    observation, agent = begin_episode(world, config, plan, rng)
+    cameras = _cameras(config, rng)
+    perturbation, delay = ControlPerturbation(rng), DelayedStart(rng)
+    selector = KeyFrameSelector(round(config.duration / world.dt), plan.tailgating)
+    with EpisodeWriter(episode_path(folder, number), plan.scenario) as writer:
+        for index in range(selector.max_steps):
+            is_key_frame = selector.select(world.truth().affordances, observation.speed)
+            clean = agent.act(observation)
+            driven = delay.apply(perturbation.apply(clean, observation.speed), observation.speed)
+            if is_key_frame:
+                controls = Controls(clean=clean, driven=driven)
+                for frame in _frames(world, observation, cameras, index, controls, config.semantic):
+                    writer.append(frame)
+            observation = world.step(driven)
+            truth = world.truth()
+            at_end = truth.route_done >= truth.route_length - ROUTE_MARGIN
+            if selector.selected == selector.wanted or truth.contacts or at_end:
+                break
+    return selector.selected * len(cameras)
+
+
+def _cameras(config: CollectConfig, rng: np.random.Generator) -> list[CameraConfig]:
+    """Three cameras, each turned at random."""
+    yaws = rng.uniform(-MAX_YAW, MAX_YAW, size=len(BASELINES))
+    return [
+        CameraConfig(width=config.width, height=config.height, left=left, yaw=float(yaw))
+        for left, yaw in zip(BASELINES, yaws, strict=True)
+    ]
+
+
 def _frames(
-    world: RecordableWorld, observation: Observation, mounts: Sequence[CameraConfig], index: int, controls: Controls,
+    world: RecordableWorld, observation: Observation, cameras: Sequence[CameraConfig], index: int, controls: Controls,
     semantic: bool,
 ) -> Iterator[Frame]:  # fmt: skip
-    """What each camera sees at a moment, with its labels."""
-    semantics = world.semantic_images(mounts) if semantic else [None] * len(mounts)
-    seen = zip(mounts, world.images(mounts), semantics, strict=True)
-    for camera, (mount, image, classes) in enumerate(seen):
-        others = world.other_commands_at(mount)
+    """What each camera sees in a step, with its labels."""
+    semantics = world.semantic_images(cameras) if semantic else [None] * len(cameras)
+    views = zip(cameras, world.images(cameras), semantics, strict=True)
+    for k, (camera, image, classes) in enumerate(views):
+        others = world.other_commands_at(camera)
         yield Frame(
             index=index, time=observation.time, speed=observation.speed, command=observation.command,
-            affordances=world.labels_at(mount), driven=controls.driven, clean=controls.clean, image=image,
-            camera=camera, camera_left=mount.left, camera_yaw=mount.yaw, semantic=classes,
+            affordances=world.labels_at(camera), driven=controls.driven, clean=controls.clean, image=image,
+            camera=k, camera_left=camera.left, camera_yaw=camera.yaw, semantic=classes,
             junction=world.route.inside_junction(world.truth().route_done),
             other=others[index % len(others)] if others else None,
         )  # fmt: skip

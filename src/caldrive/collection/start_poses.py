@@ -1,4 +1,4 @@
-"""Where recorded episodes begin: anywhere, or before what is rare."""
+"""Where recorded episodes begin: anywhere, or shortly before what is rare, such as speed signs and turns."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from caldrive.agents.cal import CALAgent, OraclePerception
+from caldrive.agents.cal import CALAgent
 from caldrive.collection.config import CollectConfig
-from caldrive.collection.perturbation import HiddenCars, Tailgater
+from caldrive.collection.oracles import random_oracle
 from caldrive.control.controller import CALController, ControlConfig
 from caldrive.control.patience import PatienceConfig
 from caldrive.datatypes import Command, Observation, Pose, Sign
@@ -21,62 +21,66 @@ from caldrive.world.scene.domain_randomisation import one_of
 from caldrive.world.town import load_town
 from caldrive.world.traffic.vehicles import room
 
-AHEAD_OF_SIGN, AHEAD_OF_TURN = (15.0, 45.0), (2.0, 25.0)  # m
-ASIDE, ASKEW = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
-GAPS = (0.4, 4.0)  # m behind other cars, of those who tailgate
-CAPS = (20.0, 20.0, None)  # km/h, one of them at random, None for the signs alone; tailgaters have the first
-FAST, SLOW = 14, 6  # m/s; no episode is faster in the mean, and no tailgater's
-SEARCH = 6  # times the wanted duration that a tailgater may drive, who has to find a car
+BEFORE_SIGN, BEFORE_TURN = (15.0, 45.0), (2.0, 25.0)  # m
+LANE_MARGIN = 3.0  # m kept to the ends of a lane by a start anywhere; shorter lanes than four times this have none
+OFFSETS, MAX_TURN = (-1.5, 4.0), 0.4  # m to the left, from the kerb to the opposite lane, and rad
+CAPS = (20.0, 20.0, None)  # km/h, one of them at random, None for the signs alone; tailgating drivers have the first
+MEAN_SPEED, TAILGATING_SPEED = 14, 6  # m/s; no episode is faster in the mean, and no tailgating one
+SEARCH = 6  # times the wanted duration that a tailgating driver may drive, who has to find a car
 
 
-def starting_place(
+def start_pose(
     roads: RoadNetwork, signs: Sequence[Sign], before_signs: float, before_turns: float, rng: np.random.Generator
 ) -> tuple[Pose, str | None]:
     """Anywhere on the roads, or in a share of the cases some way before a sign or a turn at a junction; each limit and
-    each command gets as many of these. Returns the place, and the lane of that turn if any."""
+    each command gets as many of these. Returns the pose, and the id of that turn's lane if any."""
     chance = rng.random()
     limits = sorted({sign.limit for sign in signs})
     if limits and chance < before_signs:
         limit = one_of(limits, rng)
         sign = one_of([sign for sign in signs if sign.limit == limit], rng)
-        lane, at = roads.lane_at(sign.pose)
-        return _upstream(roads, lane, at - float(rng.uniform(*AHEAD_OF_SIGN))), None
+        lane, s = roads.lane_at(sign.pose)
+        return _upstream(roads, lane, s - float(rng.uniform(*BEFORE_SIGN))), None
     turns = [lane for lane in roads.lanes.values() if lane.turn is not None]
     commands = [command for command in Command if any(lane.turn is command for lane in turns)]
     if commands and before_signs <= chance < before_signs + before_turns:
         command = one_of(commands, rng)
         turn = one_of([lane for lane in turns if lane.turn is command], rng)
-        return _upstream(roads, turn, -float(rng.uniform(*AHEAD_OF_TURN))), turn.id
-    lane = one_of([lane for lane in roads.driveable if lane.line.length > 12], rng)
-    return lane.line.pose_at(float(rng.uniform(3, lane.line.length - 3))), None
+        return _upstream(roads, turn, -float(rng.uniform(*BEFORE_TURN))), turn.id
+    lane = one_of([lane for lane in roads.driveable if lane.line.length > 4 * LANE_MARGIN], rng)
+    return lane.line.pose_at(float(rng.uniform(LANE_MARGIN, lane.line.length - LANE_MARGIN))), None
 
 
 def _upstream(roads: RoadNetwork, lane: Lane, s: float) -> Pose:
     """The place s m along a lane; where that is negative, as far up the street before it, but inside no junction."""
-    before = [one for one in roads.lanes.values() if lane.id in one.successors]
+    before = [other for other in roads.lanes.values() if lane.id in other.successors]
     if s >= 1 or len(before) != 1 or before[0].turn is not None:
         return lane.line.pose_at(max(s, 1.0))
     return _upstream(roads, before[0], s + before[0].line.length)
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What an episode is before it begins: where it drives, among whom, in which look of the town, and how."""
+class EpisodePlan:
+    """What an episode is before it begins."""
 
     scenario: Scenario
+    """Where it drives, and among whom."""
     route: Route
+    """The way, with random turns."""
     appearance: int
+    """The look of the town, 0 for its own."""
     tailgating: bool
+    """Whether the driver looks for cars and comes close to them."""
 
 
-def plan_episode(config: CollectConfig, number: int, rng: np.random.Generator) -> Plan:
-    """A random start and random turns."""
+def plan_episode(config: CollectConfig, number: int, rng: np.random.Generator) -> EpisodePlan:
+    """A random start and random turns. number: of the episode, from 0."""
     tailgating = rng.random() < config.tailgating
     appearance = int(rng.integers(1, 2**31))
     town = load_town(config.town, appearance if rng.random() < config.randomised else 0)
-    rare = (0.0, 0.0) if tailgating else (config.before_signs, config.before_turns)
-    start, turn = starting_place(town.roads, town.signs, *rare, rng)
-    length = config.duration * (SEARCH * SLOW if tailgating else FAST) + 50
+    shares = (0.0, 0.0) if tailgating else (config.before_signs, config.before_turns)
+    start, turn = start_pose(town.roads, town.signs, *shares, rng)
+    length = config.duration * (SEARCH * TAILGATING_SPEED if tailgating else MEAN_SPEED) + 50
     route = random_route(town.roads, start, length, rng, turn)
     scenario = Scenario(
         town=config.town, weather=config.weathers[number % len(config.weathers)], start=start,
@@ -84,22 +88,7 @@ def plan_episode(config: CollectConfig, number: int, rng: np.random.Generator) -
         n_pedestrians=config.people, time_limit=config.duration, seed=int(rng.integers(2**31)), task="collect",
         crossing=config.crossing,
     )  # fmt: skip
-    return Plan(scenario, route, town.appearance, tailgating)
-
-
-def begin_episode(
-    world: RecordableWorld, config: CollectConfig, plan: Plan, rng: np.random.Generator
-) -> tuple[Observation, CALAgent]:
-    """The first observation, and the driver, ready."""
-    cap = CAPS[0] if plan.tailgating else CAPS[int(rng.integers(len(CAPS)))]
-    perception = _oracle(world, config, plan.tailgating, rng)
-    # Whom no car is told of must not take one for nothing, however long it stands there.
-    agent = CALAgent(perception, CALController(ControlConfig(patience=PatienceConfig(enabled=False), cap=cap)))
-    observation = world.reset(plan.scenario, route=plan.route, appearance=plan.appearance)
-    if rng.random() < config.displaced:
-        observation = world.displace(float(rng.uniform(*ASIDE)), float(rng.uniform(-ASKEW, ASKEW)))
-    agent.reset()
-    return observation, agent
+    return EpisodePlan(scenario=scenario, route=route, appearance=town.appearance, tailgating=tailgating)
 
 
 def _cars(config: CollectConfig, tailgating: bool, most: int, rng: np.random.Generator) -> int:
@@ -109,10 +98,16 @@ def _cars(config: CollectConfig, tailgating: bool, most: int, rng: np.random.Gen
     return config.cars if rng.random() < 0.5 else config.cars // 3
 
 
-def _oracle(
-    world: RecordableWorld, config: CollectConfig, tailgating: bool, rng: np.random.Generator
-) -> OraclePerception:
-    """Who tells the controller of the town: the truth, or what makes the driver come close to cars."""
-    if tailgating:
-        return Tailgater(world.truth, float(rng.uniform(*GAPS)))
-    return (HiddenCars if rng.random() < config.hidden_cars else OraclePerception)(world.truth)
+def begin_episode(
+    world: RecordableWorld, config: CollectConfig, plan: EpisodePlan, rng: np.random.Generator
+) -> tuple[Observation, CALAgent]:
+    """The first observation, and the driver, ready."""
+    cap = CAPS[0] if plan.tailgating else CAPS[int(rng.integers(len(CAPS)))]
+    oracle = random_oracle(world.truth, config, plan.tailgating, rng)
+    # To whom no car is reported must not take one for nothing, however long the car stands there.
+    agent = CALAgent(oracle, CALController(ControlConfig(patience=PatienceConfig(enabled=False), cap=cap)))
+    observation = world.reset(plan.scenario, route=plan.route, appearance=plan.appearance)
+    if rng.random() < config.displaced:
+        observation = world.displace(float(rng.uniform(*OFFSETS)), float(rng.uniform(-MAX_TURN, MAX_TURN)))
+    agent.reset()
+    return observation, agent

@@ -17,6 +17,7 @@ from caldrive.commands.answer import Answer
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Data
 from caldrive.commands.drive import Determinism, Drive
+from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
 from caldrive.commands.train import Evaluate, Train
@@ -41,6 +42,7 @@ VERBS: Mapping[str, Verb] = {
     "data": Verb(Data, "Check and describe a recording."),
     "train": Verb(Train, "Train the network on a recording."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
+    "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
     "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),
     "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),

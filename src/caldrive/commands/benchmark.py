@@ -15,30 +15,37 @@ from caldrive.progress import Progress
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark(BenchmarkSettings, Configurable):
+    """Drive a whole suite; what a folder holds already is kept, and the rest is driven."""
+
     def run(self, progress: Progress) -> Answer:
-        from caldrive.benchmark.metrics import cells, rates
+        """Drives, and shows success and infractions of all that the folder holds."""
+        from caldrive.benchmark.metrics import cells, infraction_rates
         from caldrive.benchmark.run_folder import RunFolder
         from caldrive.benchmark.runner import benchmark
         from caldrive.commands.tables import benchmark_table
 
-        began, driven, good = time.perf_counter(), 0, 0
-        for step in benchmark(self):
-            driven, good = driven + 1, good + step.success
-            pace = driven / (time.perf_counter() - began)
-            left = (step.of - step.done) / pace / 60
-            reached = f"{step.done} of {step.of}, {100 * good / driven:.0f} % reached"
-            progress(f"{reached}, {60 * pace:.0f} a minute, {left:.0f} min left", step.done / step.of)
-        results = RunFolder(self.out).driven()
+        start, driven, successes = time.perf_counter(), 0, 0
+        for state in benchmark(self):
+            driven, successes = driven + 1, successes + state.success
+            per_second = driven / (time.perf_counter() - start)
+            minutes_left = (state.total - state.done) / per_second / 60
+            reached = f"{state.done} of {state.total}, {100 * successes / driven:.0f} % reached"
+            pace = f"{60 * per_second:.0f} a minute, {minutes_left:.0f} min left"
+            progress(f"{reached}, {pace}", state.done / state.total)
+        results = RunFolder(self.out).results()
+        rates = infraction_rates(results)
         values = {
             "out": str(self.out),
             "cells": [asdict(cell) | {"percent": cell.percent, "interval": cell.interval} for cell in cells(results)],
-            "infractions": {rate.kind.value: {"count": rate.count, "km": rate.km} for rate in rates(results)},
+            "infractions": {rate.kind.value: {"count": rate.count, "km": rate.km} for rate in rates},
         }
         return Answer(values, benchmark_table(results, str(self.out)))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Replay(Output):
+    """Drive a benchmark's episode again, and film it."""
+
     folder: tyro.conf.Positional[Path]
     """A benchmark's folder."""
     episode: tyro.conf.Positional[str]
@@ -47,25 +54,29 @@ class Replay(Output):
     """The video."""
 
     def run(self, progress: Progress) -> Answer:
+        """Drives and films; the exit code is 1 where it went otherwise than before."""
         from caldrive.benchmark.replay import replay
         from caldrive.results import result_values
 
-        found = replay(self.folder, self.episode, self.out, progress)
-        broken = ", ".join(f"{one.kind.value} at {one.time:.1f} s" for one in found.result.infractions) or "none"
-        said = f"{self.episode} {found.result.outcome.value}; infractions: {broken}; video: {found.video}"
-        same = "as before" if found.same else "not as before: other code, another model or no earlier result"
-        values = {"video": str(found.video), "same": found.same, "result": result_values(found.result)}
-        return Answer(values, f"{said}; {same}", int(not found.same))
+        again = replay(self.folder, self.episode, self.out, progress)
+        infractions = ", ".join(f"{one.kind.value} at {one.time:.1f} s" for one in again.result.infractions) or "none"
+        same = "as before" if again.same else "not as before: other code, another model or no earlier result"
+        sentence = f"{self.episode} {again.result.outcome.value}; infractions: {infractions}; video: {again.video}"
+        values = {"video": str(again.video), "same": again.same, "result": result_values(again.result)}
+        return Answer(values, f"{sentence}; {same}", int(not again.same))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Output):
+    """Tables and a page on one or more benchmarks."""
+
     folders: tyro.conf.Positional[tuple[Path, ...]]
     """Benchmarks' folders, side by side in the report."""
     out: Path = Path("out/report")
     """Folder for report.md and report.html."""
 
     def run(self, progress: Progress) -> Answer:
+        """Writes the report as Markdown and as an HTML page."""
         from caldrive.benchmark.report.page import report_page, report_text
         from caldrive.benchmark.report.runs import failures, load_runs
         from caldrive.checks import require_writable_folder

@@ -18,20 +18,21 @@ from caldrive.results import EpisodeResult, Outcome, mean_speed
 
 if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.benchmark.metrics import Cell
-    from caldrive.benchmark.suites import Driven
+    from caldrive.benchmark.suites import TrialResult
     from caldrive.driving.drive import DriveReport
     from caldrive.driving.speed import WorldTiming
     from caldrive.perception.evaluation.report import Report
-    from caldrive.recordings.check import Recording
+    from caldrive.recordings.check import RecordingSummary
 
 
 def infraction_counts(result: EpisodeResult) -> dict[str, int]:
     """How many of each kind, in the order in which they first happened."""
-    return dict(Counter(one.kind.value for one in result.infractions))
+    return dict(Counter(infraction.kind.value for infraction in result.infractions))
 
 
 def _row(k: int, result: EpisodeResult) -> list[str | Text]:
-    broken = ", ".join(f"{n} × {kind}" for kind, n in infraction_counts(result).items())
+    """An episode's row of `drive_table`."""
+    infractions = ", ".join(f"{n} × {kind}" for kind, n in infraction_counts(result).items())
     reached = result.outcome is Outcome.SUCCESS
     return [
         str(k),
@@ -40,7 +41,7 @@ def _row(k: int, result: EpisodeResult) -> list[str | Text]:
         f"{result.duration:.0f} / {result.scenario.time_limit:.0f} s",
         f"{result.distance:.0f} / {result.route_length:.0f} m",
         f"{mean_speed(result):.1f}",
-        Text(broken or "none", "red" if broken else "green"),
+        Text(infractions or "none", "red" if infractions else "green"),
     ]
 
 
@@ -52,8 +53,8 @@ def drive_table(report: DriveReport) -> Group:
     for k, result in enumerate(report.results):
         table.add_row(*_row(k, result))
     reached = sum(result.outcome is Outcome.SUCCESS for result in report.results)
-    broken = sum(len(result.infractions) for result in report.results)
-    summary = f"{reached} of {len(report.results)} reached the goal in time; infractions: {broken or 'none'}"
+    infractions = sum(len(result.infractions) for result in report.results)
+    summary = f"{reached} of {len(report.results)} reached the goal in time; infractions: {infractions or 'none'}"
     video = [Text(f"video: {report.video}")] if report.video else []
     return Group(table, Text(summary), *video, Text(f"episodes: {report.files[0].parent}"))
 
@@ -79,66 +80,63 @@ def counts_table(folder: Path, counts: dict[str, dict[str, int]]) -> Group:
     return Group(table, Text(f"recorded: {folder}; train on it: caldrive train --data {folder}"))
 
 
-def recording_table(found: Recording, picture: Path | None) -> Group:
+def recording_table(summary: RecordingSummary, picture: Path | None) -> Group:
     """What a recording holds, and its damaged files and missing episodes."""
-    weathers = ", ".join(f"{n} in weather {weather}" for weather, n in sorted(found.weathers.items(), key=_number))
-    shown: list[Table | Text] = [Text(f"{found.episodes} episodes: {weathers or 'none is sound'}")]
+    weathers = sorted(summary.weathers.items(), key=lambda item: int(item[0]))
+    by_weather = ", ".join(f"{n} in weather {weather}" for weather, n in weathers)
+    shown: list[Table | Text] = [Text(f"{summary.episodes} episodes: {by_weather or 'none is sound'}")]
     if picture is not None:
         table = Table("label", "value", "frames", "share", box=SIMPLE_HEAD)
-        for name, values in found.counts.items():
+        for name, values in summary.counts.items():
             for value, n in values.items():
-                table.add_row(name.replace("_", " "), value, str(n), f"{100 * n / found.frames:.1f} %")
-        shown += [Text(f"{found.frames} frames, {found.minutes:.0f} minutes"), table, Text(f"histograms: {picture}")]
-    damaged = [Text(sentence, "red") for sentence in found.damaged] or [Text("no damaged file", "green")]
-    left = [Text(f"{found.missing} more were asked for: type `caldrive collect` as before", "yellow")]
-    return Group(*shown, *damaged, *(left if found.missing else []))
+                table.add_row(name.replace("_", " "), value, str(n), f"{100 * n / summary.frames:.1f} %")
+        size = Text(f"{summary.frames} frames, {summary.minutes:.0f} minutes")
+        shown += [size, table, Text(f"histograms: {picture}")]
+    shown += [Text(sentence, "red") for sentence in summary.damaged] or [Text("no damaged file", "green")]
+    if summary.missing:
+        shown.append(Text(f"{summary.missing} more were asked for: type `caldrive collect` as before", "yellow"))
+    return Group(*shown)
 
 
-def _number(item: tuple[str, int]) -> int:
-    return int(item[0])
-
-
-def _published(cell: Cell) -> str:
+def _cell_text(cell: Cell) -> Text:
+    """Success with its interval, and what the paper's CAL reached."""
     from caldrive.benchmark.published import success
 
-    found = success("CAL", cell.condition, cell.task)
-    return "" if found is None else f"  paper {found}"
+    (low, high), published = cell.interval, success("CAL", cell.condition, cell.task)
+    text = f"{cell.successes}/{cell.episodes}  {cell.percent:.0f} % ({low:.0f}-{high:.0f})"
+    return Text(text if published is None else f"{text}  paper {published}", no_wrap=True)
 
 
-def _text(cell: Cell) -> Text:
-    low, high = cell.interval
-    text = f"{cell.successes}/{cell.episodes}  {cell.percent:.0f} % ({low:.0f}-{high:.0f}){_published(cell)}"
-    return Text(text, no_wrap=True)
-
-
-def success_table(driven: Sequence[Driven]) -> Table:
+def success_table(results: Sequence[TrialResult]) -> Table:
     """Success in each cell, percent with the 95 % interval, beside what the paper's CAL reached."""
     from caldrive.benchmark.metrics import cells
 
-    found = {(cell.condition, cell.task): cell for cell in cells(driven)}
-    conditions, tasks = (list(dict.fromkeys(key[k] for key in found)) for k in (0, 1))
+    by_place = {(cell.condition, cell.task): cell for cell in cells(results)}
+    conditions, tasks = (list(dict.fromkeys(place[k] for place in by_place)) for k in (0, 1))
     table = Table("success", *map(escape, conditions), box=SIMPLE_HEAD)
     for task in tasks:
-        row = [found.get((condition, task)) for condition in conditions]
-        table.add_row(Text(task), *(_text(cell) if cell else "" for cell in row))
+        row = [by_place.get((condition, task)) for condition in conditions]
+        table.add_row(Text(task), *(_cell_text(cell) if cell else "" for cell in row))
     return table
 
 
-def infraction_table(driven: Sequence[Driven]) -> Table:
+def infraction_table(results: Sequence[TrialResult]) -> Table:
     """Kilometres between infractions of each kind, by condition."""
-    from caldrive.benchmark.metrics import rates
+    from caldrive.benchmark.metrics import infraction_rates
 
-    conditions = list(dict.fromkeys(one.trial.condition for one in driven))
+    conditions = list(dict.fromkeys(result.trial.condition for result in results))
     table = Table("km between", *map(escape, conditions), box=SIMPLE_HEAD)
-    columns = [rates([one for one in driven if one.trial.condition == name]) for name in conditions]
+    columns = [
+        infraction_rates([result for result in results if result.trial.condition == name]) for name in conditions
+    ]
     for row in zip(*columns, strict=True):
         table.add_row(row[0].kind.value, *(f"{rate.km_between} ({rate.count})" for rate in row))
     return table
 
 
-def benchmark_table(driven: Sequence[Driven], out: str) -> Group:
+def benchmark_table(results: Sequence[TrialResult], out: str) -> Group:
     """Both, and where the results are."""
-    return Group(success_table(driven), infraction_table(driven), Text(f"results: {out}"))
+    return Group(success_table(results), infraction_table(results), Text(f"results: {out}"))
 
 
 def _metric(spec: AffordanceSpec) -> str:

@@ -1,29 +1,62 @@
-"""The verbs that drive: an episode, a town on a page, the same episode twice."""
+"""The verb that draws a town: on a contact sheet of camera images, or as a plan to choose places from."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from caldrive.commands.answer import Answer, Output
 from caldrive.progress import Progress
+
+SHEET = Path("out/town.png")  # where neither a sheet nor a plan was asked for by name
 
 
 @dataclass(frozen=True, kw_only=True)
 class Town(Output):
     town: str = "town01"
     """town01, town02 or an OpenDRIVE file."""
-    sheet: Path = Path("out/town.png")
-    """The PNG file to write."""
+    sheet: Path | None = None
+    """A PNG file for camera images of the town in all weathers; out/town.png where no --plan is asked for."""
+    plan: Path | None = None
+    """A PNG file for a map with lanes, lights, signs and coordinates, to choose the places of caldrive drive --from
+    X,Y --to X,Y from."""
     width: int | None = None
-    """Its width in pixels."""
+    """The width of each file in pixels."""
     randomised: int = 0
-    """Show the town in so many random looks, as recordings have them, instead of the weathers."""
+    """Show the town on the sheet in so many random looks, as recordings have them, instead of the weathers."""
 
     def run(self, progress: Progress) -> Answer:
-        from caldrive.visualization.contact_sheet import write_sheet
+        sheet = SHEET if self.sheet is None and self.plan is None else self.sheet
+        self._check(sheet)
+        values: dict[str, Any] = {"town": self.town}
+        lines = []
+        if self.plan is not None:
+            from caldrive.visualization.town_plan import write_plan
 
-        progress("drawing", 0.0)
-        width, height = write_sheet(self.town, self.sheet, self.width, self.randomised)
-        values = {"town": self.town, "sheet": str(self.sheet), "width": width, "height": height}
-        return Answer(values, f"{self.town} on one page: {self.sheet} ({width} x {height})")
+            progress("drawing the plan", 0.0)
+            width, height = write_plan(self.town, self.plan, self.width)
+            values |= {"plan": str(self.plan), "plan_width": width, "plan_height": height}
+            lines.append(f"plan of {self.town}: {self.plan} ({width} x {height})")
+        if sheet is not None:
+            from caldrive.visualization.contact_sheet import write_sheet
+
+            progress("drawing the sheet", 0.1)
+            width, height = write_sheet(self.town, sheet, self.width, self.randomised)
+            values |= {"sheet": str(sheet), "width": width, "height": height}
+            lines.append(f"{self.town} on one page: {sheet} ({width} x {height})")
+        return Answer(values, "\n".join(lines))
+
+    def _check(self, sheet: Path | None) -> None:
+        """Raises ValueError or OSError where a file cannot be, before the other one is written."""
+        from caldrive.checks import require_writable_file
+
+        for option, path in (("--sheet", sheet), ("--plan", self.plan)):
+            if path is not None:
+                require_writable_file(path, option, ".png")
+        if self.plan is not None and sheet is not None and self.plan.resolve() == sheet.resolve():
+            raise ValueError(f"found {sheet} for the sheet and for the plan, wanted two files: type another --plan")
+        if self.randomised and sheet is None:
+            raise ValueError(
+                "found --randomised without --sheet, wanted both, as a plan has no looks: type --sheet FILE"
+            )

@@ -40,8 +40,11 @@ def _check(settings: EpisodeSettings, n: int) -> None:
     if settings.seconds is not None:
         require_within("--seconds", settings.seconds, 0.1, math.inf, 60)
     if bool(settings.start) != bool(settings.goal) or (settings.world != "embedded" and not settings.start):
+        places = [
+            f"{option} {place}" for option, place in (("--from", settings.start), ("--to", settings.goal)) if place
+        ]
         raise ValueError(
-            f"found --from {settings.start} and --to {settings.goal}, wanted both places: "
+            f"found {places[0] if places else 'neither --from nor --to'}, wanted a start and a goal: "
             "type --from X,Y --to X,Y (caldrive town --plan FILE.png draws a map to choose from)"
         )
 

@@ -6,45 +6,61 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import savgol_filter
 
-Floats = NDArray[np.float64]
-WINDOW = 7  # frames
-TURNING = 0.05  # rad/s, the yaw rate from which a car turns
-# nuPlan's bounds: longitudinal acceleration (low, high), lateral acceleration, longitudinal jerk, magnitude of the
-# jerk, yaw rate, yaw acceleration.
-NUPLAN = ((-4.05, 2.40), 4.89, 4.13, 8.37, 0.95, 1.93)
+Column = NDArray[np.float64]  # (N,), a value for each step
+WINDOW = 7  # steps
+TURNING_RATE = 0.05  # rad/s, the yaw rate from which a car turns
+# nuPlan's bounds in SI units.
+ACCELERATION = (-4.05, 2.40)
+LATERAL_ACCELERATION = 4.89
+LONGITUDINAL_JERK = 4.13
+JERK_MAGNITUDE = 8.37
+YAW_RATE = 0.95
+YAW_ACCELERATION = 1.93
 
 
 def comfort(times: ArrayLike, speeds: ArrayLike, headings: ArrayLike, centers: ArrayLike) -> dict[str, float]:
-    """Figures of an episode by name, from its frames: those of `motion`, and the median |centre distance| in m."""
+    """Metrics of an episode by name: those of `motion`, and center_distance, the median |centre distance| in m.
+
+    (N,) each: times in s, speeds in m/s, headings in rad, distances to the centre line in m.
+    """
     time, center = np.asarray(times, dtype=float), np.abs(np.asarray(centers, dtype=float))
     dt = float(np.ptp(time)) / (len(time) - 1) if len(time) > 1 else 0.0
-    figures = motion(np.asarray(speeds, dtype=float), np.unwrap(np.asarray(headings, dtype=float)), dt)
-    return {"center_distance": float(np.median(center)) if len(center) else 0.0} | figures
+    metrics = motion(np.asarray(speeds, dtype=float), np.unwrap(np.asarray(headings, dtype=float)), dt)
+    return {"center_distance": float(np.median(center)) if len(center) else 0.0} | metrics
 
 
-def motion(speed: Floats, heading: Floats, dt: float) -> dict[str, float]:
-    """Figures of comfort from speeds (N,) in m/s and continuous headings (N,) in rad, in SI units.
+def motion(speed: Column, heading: Column, dt: float) -> dict[str, float]:
+    """Metrics of comfort from speeds (N,) in m/s and continuous headings (N,) in rad, dt s apart, in SI units.
 
     jerk: RMS along the road; lateral_straight, lateral_turn: RMS of the lateral jerk on straights and in turns;
     turning: seconds in turns; comfortable: share of time within nuPlan's bounds. Derivatives are those of a parabola
-    through WINDOW frames, as nuPlan takes them.
+    through WINDOW steps, as nuPlan takes them.
     """
     if len(speed) < WINDOW:
         return {"jerk": 0.0, "lateral_straight": 0.0, "lateral_turn": 0.0, "turning": 0.0, "comfortable": 1.0}
     speed, acceleration, jerk = (savgol_filter(speed, WINDOW, 2, deriv=k, delta=dt) for k in range(3))
-    rate, yaw = (savgol_filter(heading, WINDOW, 2, deriv=k, delta=dt) for k in (1, 2))
-    lateral = speed * rate
-    sideways = acceleration * rate + speed * yaw
-    turns = np.abs(rate) > TURNING
-    (low, high), *limits = NUPLAN
-    within = (acceleration >= low) & (acceleration <= high)
-    for value, limit in zip((lateral, jerk, np.hypot(jerk, sideways), rate, yaw), limits, strict=True):
-        within &= np.abs(value) <= limit
+    yaw_rate, yaw_acceleration = (savgol_filter(heading, WINDOW, 2, deriv=k, delta=dt) for k in (1, 2))
+    lateral_acceleration = speed * yaw_rate
+    lateral_jerk = acceleration * yaw_rate + speed * yaw_acceleration
+    bounds = (
+        (lateral_acceleration, LATERAL_ACCELERATION),
+        (jerk, LONGITUDINAL_JERK),
+        (np.hypot(jerk, lateral_jerk), JERK_MAGNITUDE),
+        (yaw_rate, YAW_RATE),
+        (yaw_acceleration, YAW_ACCELERATION),
+    )
+    comfortable = (acceleration >= ACCELERATION[0]) & (acceleration <= ACCELERATION[1])
+    for values, bound in bounds:
+        comfortable &= np.abs(values) <= bound
+    turns = np.abs(yaw_rate) > TURNING_RATE
     return {
-        "jerk": _rms(jerk), "lateral_straight": _rms(sideways[~turns]), "lateral_turn": _rms(sideways[turns]),
-        "turning": float(turns.sum() * dt), "comfortable": float(within.mean()),
-    }  # fmt: skip
+        "jerk": _rms(jerk),
+        "lateral_straight": _rms(lateral_jerk[~turns]),
+        "lateral_turn": _rms(lateral_jerk[turns]),
+        "turning": float(turns.sum() * dt),
+        "comfortable": float(comfortable.mean()),
+    }
 
 
-def _rms(values: Floats) -> float:
+def _rms(values: Column) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0

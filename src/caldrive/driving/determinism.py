@@ -10,46 +10,52 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
-from caldrive.datatypes import Step
+from caldrive.datatypes import DT, Step
 from caldrive.driving.settings import DeterminismSettings
 from caldrive.progress import Progress, silent
 
 PARTS = ("image", "truth", "decision", "control")
 
 
-def digest(value: Any) -> str:
-    """SHA-256 over the bytes of an image or over every digit of other data."""
-    content = value.tobytes() if hasattr(value, "tobytes") else repr(value).encode()
-    return hashlib.sha256(content).hexdigest()
-
-
-def step_digests(step: Step) -> tuple[str, ...]:
-    """One digest for each of PARTS."""
-    return tuple(digest(value) for value in (step.observation.image, step.truth, step.decision, step.control))
-
-
 @dataclass(frozen=True)
-class Digests:
-    """One process's episode: the digests of each step, and that of the result."""
+class EpisodeDigests:
+    """What one process drove, in short."""
 
     steps: tuple[tuple[str, ...], ...]
+    """For each step a digest of each of PARTS."""
     result: str
+    """The digest of the episode's result."""
+    dt: float = DT
+    """Seconds of a step."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """steps: how many were compared. difference: in words, empty where both runs are equal. digest: over all of it."""
+    """How two runs of one episode compare."""
 
     steps: int
+    """How many were compared."""
     difference: str
+    """In words; empty where both runs are equal."""
     digest: str
+    """Of all of the first run."""
 
     @property
     def equal(self) -> bool:
+        """Whether both runs have the same bytes."""
         return not self.difference
 
 
-def drive_and_digest(settings: DeterminismSettings) -> Digests:
+def check_determinism(settings: DeterminismSettings, progress: Progress = silent) -> Comparison:
+    """Drive the scenario in two fresh processes side by side. Raises what driving raises."""
+    progress("driving twice", 0.0)
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=spawn, max_tasks_per_child=1) as pool:
+        first, second = pool.map(drive_and_digest, [settings, settings])
+    return compare(first, second)
+
+
+def drive_and_digest(settings: DeterminismSettings) -> EpisodeDigests:
     """Drive the scenario in this process, with the camera on."""
     from caldrive.driving.choice import chosen_scenarios
     from caldrive.driving.rollout import run_episode
@@ -60,27 +66,30 @@ def drive_and_digest(settings: DeterminismSettings) -> Digests:
     steps: list[tuple[str, ...]] = []
     with closing(world):
         result = run_episode(world, agent, scenario, lambda step: steps.append(step_digests(step)))
-    return Digests(tuple(steps), digest(result))
+        return EpisodeDigests(steps=tuple(steps), result=digest(result), dt=world.dt)
 
 
-def compare(first: Digests, second: Digests, dt: float = 0.1) -> Comparison:
+def step_digests(step: Step) -> tuple[str, ...]:
+    """One digest for each of PARTS."""
+    return tuple(digest(value) for value in (step.observation.image, step.truth, step.decision, step.control))
+
+
+def digest(value: Any) -> str:
+    """SHA-256 over the bytes of an image or over every digit of other data."""
+    content = value.tobytes() if hasattr(value, "tobytes") else repr(value).encode()
+    return hashlib.sha256(content).hexdigest()
+
+
+def compare(first: EpisodeDigests, second: EpisodeDigests) -> Comparison:
     """Equal, or the first step that differs and in what."""
-    whole = hashlib.sha256(repr(first).encode()).hexdigest()
+    whole = hashlib.sha256(repr((first.steps, first.result)).encode()).hexdigest()
     for i, (one, other) in enumerate(zip_longest(first.steps, second.steps)):
         if one is None or other is None:
-            said = f"one run ends after {i} steps, the other goes on"
-            return Comparison(i, said, whole)
+            return Comparison(steps=i, difference=f"one run ends after {i} steps, the other goes on", digest=whole)
         for part, a, b in zip(PARTS, one, other, strict=True):
             if a != b:
-                return Comparison(i, f"step {i} ({i * dt:.1f} s) differs in its {part}", whole)
+                difference = f"step {i} ({i * first.dt:.1f} s) differs in its {part}"
+                return Comparison(steps=i, difference=difference, digest=whole)
     same = first.result == second.result
-    return Comparison(len(first.steps), "" if same else "the results differ, though no step does", whole)
-
-
-def check_determinism(settings: DeterminismSettings, progress: Progress = silent) -> Comparison:
-    """Drive the scenario in two fresh processes side by side. Raises what driving raises."""
-    progress("driving twice", 0.0)
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=spawn, max_tasks_per_child=1) as pool:
-        first, second = pool.map(drive_and_digest, [settings, settings])
-    return compare(first, second)
+    difference = "" if same else "the results differ, though no step does"
+    return Comparison(steps=len(first.steps), difference=difference, digest=whole)

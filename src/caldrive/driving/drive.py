@@ -27,11 +27,14 @@ from caldrive.visualization.plots import draw_speed
 
 @dataclass(frozen=True)
 class DriveReport:
-    """How the episodes went, the file of each, and the video if one was made."""
+    """How the episodes of a drive went."""
 
     results: tuple[EpisodeResult, ...]
+    """One for each episode."""
     files: tuple[Path, ...]
+    """The trace of each (JSON)."""
     video: Path | None
+    """The video of all, if one was made."""
 
     @property
     def all_reached(self) -> bool:
@@ -40,7 +43,9 @@ class DriveReport:
 
     def values(self) -> dict[str, Any]:
         """The report in JSON's types."""
-        episodes = [{"file": str(f), **result_values(r)} for f, r in zip(self.files, self.results, strict=True)]
+        episodes = [
+            {"file": str(file), **result_values(result)} for file, result in zip(self.files, self.results, strict=True)
+        ]
         return {"video": str(self.video) if self.video else None, "episodes": episodes}
 
 
@@ -52,27 +57,29 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
     """
     require_writable_folder(settings.out)
     scenarios = chosen_scenarios(settings, settings.episodes)
+    show_truth = not agent_entry(settings.agent).privileged  # an oracle goes by the truth anyway
     world, agent = set_up(settings, settings.world)
     results, files = [], []
     with closing(world), VideoWriter(settings.out / "drive.mp4", rate=1 / world.dt) as video:
         for k, scenario in enumerate(scenarios):
-            trace = Trace()
+            trace, referee = Trace(), Referee(scenario)
             text = caption(scenario, k + 1, len(scenarios))
-            referee = Referee(scenario)
-            shown_truth = not agent_entry(settings.agent).privileged
-            film = EpisodeFilm(video, world, Shown(text, scenario, referee.infractions, shown_truth))
+            film = EpisodeFilm(video, world, Shown(text, scenario, referee.infractions, show_truth))
             watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]
-            result = run_episode(world, agent, scenario, _each(watchers + [film.add] * settings.video), referee)
+            watchers += [film.add] if settings.video else []
+            result = run_episode(world, agent, scenario, _each(watchers), referee)
             film.end(result)
             results.append(result)
             files.append(settings.out / f"episode-{k:03d}.json")
             write_whole(files[-1], episode_json(result, trace))
             if settings.video:
                 draw_speed(trace.columns(), text, files[-1].with_suffix(".png"))
-    return DriveReport(tuple(results), tuple(files), video.path if video.frames else None)
+    return DriveReport(results=tuple(results), files=tuple(files), video=video.path if video.frames else None)
 
 
 def _each(watchers: list[Callable[[Step], None]]) -> Callable[[Step], None]:
+    """One watcher that shows a step to all of them."""
+
     def watch(step: Step) -> None:
         for watcher in watchers:
             watcher(step)
@@ -81,7 +88,7 @@ def _each(watchers: list[Callable[[Step], None]]) -> Callable[[Step], None]:
 
 
 def _reporter(progress: Progress, scenario: Scenario, k: int, of: int) -> Callable[[Step], None]:
-    """Tells how far the drive has come: by the route, or by the time where that has gone further."""
+    """Reports how far the drive has come: by the route, or by the time where that has gone further."""
 
     def report(step: Step) -> None:
         done = max(step.truth.route_done / step.truth.route_length, step.truth.time / scenario.time_limit)

@@ -18,6 +18,7 @@ from caldrive.scenarios import Scenario
 
 GOAL_RADIUS = 2.0  # m
 RISE_FRAMES = 10
+NEVER = -1000  # a frame long before the first one
 REST_FRAMES = {
     InfractionKind.OPPOSITE_LANE: 20,
     InfractionKind.SIDEWALK: 20,
@@ -32,17 +33,18 @@ COLLISIONS = {  # kind and impulse in N s above which it counts
     ContactKind.CAR: (InfractionKind.COLLISION_CAR, 400.0),
     ContactKind.PERSON: (InfractionKind.COLLISION_PERSON, 300.0),
 }
-LIGHT_ANGLE = math.radians(60)  # a light further off the ego's heading is for others
+MAX_LIGHT_ANGLE = math.radians(60)  # a light further off the ego's heading is for others
 
 
 def front(ego: VehicleState) -> tuple[float, float]:
-    """The middle of the front bumper."""
+    """The middle of the front bumper (x, y), m."""
     reach = ego.length / 2
     return ego.pose.x + reach * math.cos(ego.pose.heading), ego.pose.y + reach * math.sin(ego.pose.heading)
 
 
 def crosses(light: TrafficLight, before: tuple[float, float], after: tuple[float, float]) -> bool:
-    """Whether a point that moves from before to after passes the stop line in the sense of the light's traffic."""
+    """Whether a point (x, y) that moves from before to after passes the stop line in the sense of the light's
+    traffic."""
     (ax, ay), (bx, by) = light.stop_line
     length = math.hypot(bx - ax, by - ay)
     tx, ty = (bx - ax) / length, (by - ay) / length
@@ -59,19 +61,22 @@ def crosses(light: TrafficLight, before: tuple[float, float], after: tuple[float
 def runs_red(light: TrafficLight, last: VehicleState, ego: VehicleState) -> bool:
     """Whether the ego's front crossed this light's stop line while it showed red to the ego."""
     turned = abs(wrap_angle(light.pose.heading - ego.pose.heading))
-    return light.state is LightState.RED and turned <= LIGHT_ANGLE and crosses(light, front(last), front(ego))
+    return light.state is LightState.RED and turned <= MAX_LIGHT_ANGLE and crosses(light, front(last), front(ego))
 
 
 class Referee:
-    """One episode's referee. infractions: those so far, each once, with its time and place. fatal: infractions that end
-    the episode as a failure."""
+    """One episode's referee.
+
+    fatal: infractions that end the episode as a failure. infractions: those so far, each once, with its time and place.
+    outcome: None while the episode goes on.
+    """
 
     def __init__(self, scenario: Scenario, fatal: Collection[InfractionKind] = ()) -> None:
         self.scenario, self.fatal = scenario, fatal
         self.infractions: list[Infraction] = []
         self.outcome: Outcome | None = None
         self._frame = 0
-        self._counted: dict[tuple[InfractionKind, bool], int] = {}  # frame of the last one of its kind and fault
+        self._last_counted: dict[tuple[InfractionKind, bool], int] = {}  # frame of the last one of its kind and fault
         self._shares = {kind: deque[float](maxlen=RISE_FRAMES + 1) for kind in SHARE_RISE}
         self._last: Truth | None = None
         self._distance = 0.0
@@ -81,12 +86,12 @@ class Referee:
         self._centers: list[float] = []
 
     def watch(self, truth: Truth) -> Outcome | None:
-        """Take note of one frame; the outcome if the episode is over, else None."""
+        """Judge one frame; the outcome if the episode is over, else None."""
         self._watch_shares(truth)
         self._watch_contacts(truth)
         self._watch_lights(truth)
-        self._note(truth)
-        if any(one.kind in self.fatal for one in self.infractions):
+        self._keep(truth)
+        if any(infraction.kind in self.fatal for infraction in self.infractions):
             self.outcome = Outcome.FAILED
         elif truth.goal_distance <= GOAL_RADIUS:
             self.outcome = Outcome.SUCCESS
@@ -132,13 +137,15 @@ class Referee:
             self._count(InfractionKind.RED_LIGHT, truth)
 
     def _count(self, kind: InfractionKind, truth: Truth, at_fault: bool = True) -> None:
-        """One more infraction, unless one of its kind and fault was counted a moment ago."""
-        if self._frame - self._counted.get((kind, at_fault), -1000) <= REST_FRAMES[kind]:
+        """One more infraction, unless one of its kind and fault was counted shortly before."""
+        if self._frame - self._last_counted.get((kind, at_fault), NEVER) <= REST_FRAMES[kind]:
             return
-        self._counted[kind, at_fault] = self._frame
-        self.infractions.append(Infraction(kind, truth.time, truth.ego.pose.x, truth.ego.pose.y, at_fault))
+        self._last_counted[kind, at_fault] = self._frame
+        place = truth.ego.pose
+        self.infractions.append(Infraction(kind=kind, time=truth.time, x=place.x, y=place.y, at_fault=at_fault))
 
-    def _note(self, truth: Truth) -> None:
+    def _keep(self, truth: Truth) -> None:
+        """What the result is made of."""
         if self._last is not None:
             before, now = self._last.ego.pose, truth.ego.pose
             self._distance += math.hypot(now.x - before.x, now.y - before.y)

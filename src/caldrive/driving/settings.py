@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from tyro.conf import arg
+from tyro.conf import Positional, arg
 
 from caldrive.agents.settings import AgentSettings
 
@@ -80,14 +80,31 @@ class WorldSpeedSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AgentSpeedSettings:
+class AgentSpeedSettings(AgentSettings):
     """Milliseconds from image to control."""
 
-    agent: str = "cal"
-    """Which agent: cal, oracle, or your own: package.module:Class or file.py:Class."""
-    model: Path | None = None
-    """The network, a .safetensors file; without it the one in the package."""
     steps: int = 300
     """How many images to measure."""
     threads: int | None = None
     """Threads for the network; without it as many as the machine has cores."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeeSettings:
+    """Run the network on your own video or pictures. It knows only the embedded towns: in other pictures its values
+    may mean nothing."""
+
+    source: Annotated[Positional[Path], arg(metavar="VIDEO_OR_FOLDER")]
+    """A video, a folder of pictures (.png, .jpg; by name, 10 a second), or one picture."""
+    crop: Annotated[str | None, arg(metavar="A:B")] = None
+    """Rows A to B of each picture to look at, counted from the top; the authors keep 120:480 of their 600."""
+    command: Literal["left", "straight", "right"] = "straight"
+    """What the navigation system asks for at the next junction, in all pictures."""
+    model: Path | None = None
+    """The network, a .safetensors file; without it the one in the package."""
+    every: Annotated[int, arg(metavar="N")] = 1
+    """Take only every Nth picture: the network learnt at 10 a second, so that 3 suits a video of 30."""
+    out: Path = Path("out/see.mp4")
+    """The video to write, an .mp4 file."""
+    values: Path | None = None
+    """The affordances of every picture, a .csv or .parquet file; without it a .csv beside the video."""

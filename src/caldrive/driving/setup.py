@@ -11,13 +11,14 @@ from caldrive.interfaces import Agent, World
 from caldrive.plugins import is_plugin, load_plugin
 
 WORLDS = ("embedded",)
+WORLD_METHODS = ("reset", "step", "truth", "close")  # of `interfaces.World`
 
 
 def make_world(name: str = "embedded", camera: CameraConfig | None = None, **more: Any) -> World:
     """A world by name: `embedded`, or `package.module:Class` or `file.py:Class`, an `interfaces.World`.
 
     camera: the agent's; None drives without images. more: what only some worlds take, such as a stopwatch. Raises
-    ValueError for an unknown name.
+    ValueError for an unknown name and a class that is no World.
     """
     if name == "embedded":
         from caldrive.world.embedded import EmbeddedWorld
@@ -27,7 +28,15 @@ def make_world(name: str = "embedded", camera: CameraConfig | None = None, **mor
         raise ValueError(
             f"found world {name!r}, wanted {', '.join(WORLDS)} or your own class: type --world FILE.py:CLASS"
         )
-    world: World = load_plugin(name, "--world").build(camera=camera, **more)
+    plugin = load_plugin(name, "--world")
+    world: World = plugin.build(camera=camera, **more)
+    missing = [method for method in WORLD_METHODS if not callable(getattr(world, method, None))]
+    missing += ["dt"] * (getattr(world, "dt", None) is None)
+    if missing:
+        raise ValueError(
+            f"found that {plugin.name} has no {missing[0]}, wanted a world with dt, {', '.join(WORLD_METHODS)}: add it "
+            "(caldrive.interfaces.World says what each does)"
+        )
     return world
 
 

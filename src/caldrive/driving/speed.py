@@ -11,10 +11,10 @@ from time import perf_counter
 import numpy as np
 
 from caldrive.agents.registry import agent_entry, make_cal
-from caldrive.agents.settings import AgentSettings
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.control.controller import CALController, ControlConfig
 from caldrive.datatypes import DT, KMH, Affordances, CameraConfig, Command, Observation, Pose, Truth, VehicleState
+from caldrive.driving.rollout import next_step, reset_agent
 from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
 from caldrive.driving.setup import make_world
 from caldrive.interfaces import World, is_recordable
@@ -22,25 +22,29 @@ from caldrive.progress import Progress, silent
 from caldrive.scenarios import Scenario
 from caldrive.timing import Stopwatch
 
-PACE = 30.0  # km/h that the car under measurement drives at most
-WARM_UP, MOST_STEPS = 20, 100_000  # steps that do not count, and those that one may ask for
+MAX_SPEED = 30.0  # km/h that the car under measurement drives at most
+WARM_UP, MAX_STEPS = 20, 100_000  # steps that do not count, and those that one may ask for
 
 
 @dataclass(frozen=True)
 class WorldTiming:
-    """steps_per_second: steps by the time that they took; median_ms of a step, and of each of its parts; first_frame
-    and imports: seconds from nothing to the first image, and to load the libraries before it."""
+    """How fast the world is."""
 
     steps_per_second: float
+    """Steps by the time that they took."""
     median_ms: float
+    """Of a step."""
     parts_ms: dict[str, float]
+    """The median of each part of a step."""
     first_frame: float
+    """Seconds from nothing to the first image, once the libraries are loaded."""
     imports: float
+    """Seconds to load the libraries."""
 
 
 def measure_world(settings: WorldSpeedSettings, progress: Progress = silent) -> WorldTiming:
     """Drive along a random route with the camera on. Raises ValueError as the world's reset does."""
-    require_within("--steps", settings.steps, 1, MOST_STEPS, 600)
+    require_within("--steps", settings.steps, 1, MAX_STEPS, 600)
     require_within("--cars", settings.cars, 0, math.inf, 20)
     require_within("--people", settings.people, 0, math.inf, 50)
     require_within("--seed", settings.seed, 0, MOST_SEED, 0)
@@ -50,7 +54,7 @@ def measure_world(settings: WorldSpeedSettings, progress: Progress = silent) -> 
 
     imported, stopwatch = perf_counter(), Stopwatch()
     world = make_world("embedded", CameraConfig(), stopwatch=stopwatch)
-    agent = CALAgent(OraclePerception(world.truth), CALController(ControlConfig(cap=PACE), world.dt))
+    agent = CALAgent(OraclePerception(world.truth), CALController(ControlConfig(cap=MAX_SPEED), world.dt))
     with closing(world):
         observation = _start(world, settings)
         first_frame = perf_counter() - imported
@@ -63,9 +67,14 @@ def measure_world(settings: WorldSpeedSettings, progress: Progress = silent) -> 
             if i >= 0:
                 stopwatch.lap(perf_counter() - start)
             progress("driving", (i + WARM_UP) / (settings.steps + WARM_UP))
-    whole = [sum(lap.values()) for lap in stopwatch.laps]
-    parts = {name: 1000 * value for name, value in stopwatch.medians().items()}
-    return WorldTiming(len(whole) / sum(whole), 1000 * float(np.median(whole)), parts, first_frame, imported - begin)
+    laps = [sum(lap.values()) for lap in stopwatch.laps]
+    return WorldTiming(
+        steps_per_second=len(laps) / sum(laps),
+        median_ms=1000 * float(np.median(laps)),
+        parts_ms={name: 1000 * seconds for name, seconds in stopwatch.medians().items()},
+        first_frame=first_frame,
+        imports=imported - begin,
+    )
 
 
 def _start(world: World, settings: WorldSpeedSettings) -> Observation:
@@ -75,7 +84,7 @@ def _start(world: World, settings: WorldSpeedSettings) -> Observation:
 
     assert is_recordable(world)
     roads, rng = load_roads(settings.town), np.random.default_rng(settings.seed)
-    length = (settings.steps + WARM_UP) * world.dt * PACE * KMH + 50.0
+    length = (settings.steps + WARM_UP) * world.dt * MAX_SPEED * KMH + 50.0
     lane = max(roads.driveable, key=lambda lane: lane.line.length)
     route = random_route(roads, lane.line.pose_at(10.0), length, rng)
     scenario = Scenario(
@@ -88,35 +97,42 @@ def _start(world: World, settings: WorldSpeedSettings) -> Observation:
 
 @dataclass(frozen=True)
 class AgentTiming:
-    """Milliseconds from image to control: the median and the 99th percentile; network: its size in pixels."""
+    """How long an agent takes from image to control."""
 
     median_ms: float
+    """In the median."""
     p99_ms: float
+    """In 99 of 100 cases."""
     width: int
+    """Of its camera's images, pixels."""
     height: int
+    """Of its camera's images, pixels."""
 
 
 def measure_agent(settings: AgentSpeedSettings, progress: Progress = silent) -> AgentTiming:
-    """Run perception and controller on images of noise: how long they take does not depend on what they show."""
-    require_within("--steps", settings.steps, 1, MOST_STEPS, 300)
+    """Run an agent on images of noise: how long it takes does not depend on what they show.
+
+    Raises AgentError where the agent fails, ValueError or FileNotFoundError where it cannot be made.
+    """
+    require_within("--steps", settings.steps, 1, MAX_STEPS, 300)
     threads = os.cpu_count() or 1 if settings.threads is None else settings.threads
     require_within("--threads", threads, 1, MOST_WORKERS, 2)
-    driver = AgentSettings(agent=settings.agent, model=settings.model)
     entry = agent_entry(settings.agent)
-    camera = entry.camera(driver) or CameraConfig()
-    agent = make_cal(driver, DT, threads) if settings.agent == "cal" else entry.make(driver, DT, _no_truth)
-    agent.reset()
-    rng, took = np.random.default_rng(0), []
+    camera = entry.camera(settings) or CameraConfig()
+    agent = make_cal(settings, DT, threads) if settings.agent == "cal" else entry.make(settings, DT, _empty_road)
+    reset_agent(agent)
+    rng, milliseconds = np.random.default_rng(0), []
     for i in range(WARM_UP + settings.steps):
         image = rng.integers(0, 256, (camera.height, camera.width, 3), np.uint8)
+        observation = Observation(time=i * DT, image=image, speed=5.0, command=Command.STRAIGHT)
         start = perf_counter()
-        agent.act(Observation(0.1 * i, image, 5.0, Command.STRAIGHT))
-        took.append(1000 * (perf_counter() - start))
+        next_step(agent, observation, i)
+        milliseconds.append(1000 * (perf_counter() - start))
         progress("images", i / (WARM_UP + settings.steps))
-    median, p99 = np.percentile(took[WARM_UP:], (50, 99))
-    return AgentTiming(float(median), float(p99), camera.width, camera.height)
+    median, p99 = np.percentile(milliseconds[WARM_UP:], (50, 99))
+    return AgentTiming(median_ms=float(median), p99_ms=float(p99), width=camera.width, height=camera.height)
 
 
-def _no_truth() -> Truth:
-    """What an agent that goes by the truth gets while only its own time counts."""
+def _empty_road() -> Truth:
+    """The truth for an agent that goes by it, while only its own time counts."""
     return Truth(time=0.0, ego=VehicleState(Pose(0.0, 0.0, 0.0)), affordances=Affordances())

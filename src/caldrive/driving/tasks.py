@@ -1,13 +1,15 @@
-"""The four tasks of the benchmark (section 4): going straight, one turn, navigation, navigation among others.
+"""The four tasks of the benchmark (section 4), their routes and their scenarios: going straight, one turn, navigation,
+and navigation among other cars and people.
 
-The package's towns have 25 fixed routes for each task; `python -m caldrive.driving.tasks` draws them anew. Other maps
-get random ones.
+The package's towns have 25 fixed routes for each task, in routes.json; `python -m caldrive.driving.tasks` draws them
+again. On other maps routes are drawn from a seed.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
 
@@ -21,46 +23,52 @@ from caldrive.world.roads.route import Route, plan_route
 from caldrive.world.roads.towns import TOWNS, load_roads
 
 TASKS = ("straight", "one-turn", "navigation", "navigation-dynamic")
-
 ROUTES_PER_TASK = 25
 USUAL_TRAFFIC = {"town01": (20, 50), "town02": (15, 50)}  # cars and people of the dynamic task
+OTHER_TOWNS_TRAFFIC = (20, 50)
 _DATA = Path(__file__).with_name("routes.json")
-_FROM_STOP_LINE, _FROM_LANE_START = 25.0, 6.0  # m kept between a start and the ends of its lane
-# Shortest and longest route of a task in metres, for a town of 400 m; others scale with their size.
+# m kept between a start, or a goal, and the end of its lane, and between either and the start of its lane
+_START_BEFORE_END, _GOAL_BEFORE_END, _AFTER_START = 25.0, 5.0, 6.0
+# Shortest and longest route of a task in metres, for a town as large as town01; smaller ones scale with their size.
 _LENGTHS = {"straight": (90.0, 300.0), "one-turn": (130.0, 420.0), "navigation": (400.0, 1000.0)}
+_FULL_DIAGONAL = 520.0  # m, town01's
+_MAX_BEND = 0.2  # rad between the ends of a straight route
+_TRIES = 200  # for each route to draw
 
 
 def _fits(route: Route, task: str) -> bool:
+    """Whether a route has the turns of a task."""
     turns = sum(turn.command is not Command.STRAIGHT for turn in route.turns)
-    bends = abs(wrap_angle(route.line.heading_at(0) - route.line.heading_at(route.length))) > 0.2
+    bends = abs(wrap_angle(route.line.heading_at(0) - route.line.heading_at(route.length))) > _MAX_BEND
     return {"straight": turns == 0 and not bends, "one-turn": turns == 1, "navigation": turns >= 2}[task]
 
 
 def _random_pose(roads: RoadNetwork, before_end: float, rng: np.random.Generator) -> Pose:
-    lanes = [lane for lane in roads.driveable if lane.line.length > before_end + _FROM_LANE_START + 1]
+    """A place on a lane, at least so many metres before its end."""
+    lanes = [lane for lane in roads.driveable if lane.line.length > before_end + _AFTER_START + 1]
     shares = np.array([lane.line.length for lane in lanes])
     lane = lanes[int(rng.choice(len(lanes), p=shares / shares.sum()))]
-    return lane.line.pose_at(float(rng.uniform(_FROM_LANE_START, lane.line.length - before_end)))
+    return lane.line.pose_at(float(rng.uniform(_AFTER_START, lane.line.length - before_end)))
 
 
 def draw_routes(roads: RoadNetwork, task: str, n: int, rng: np.random.Generator) -> list[tuple[Pose, Pose]]:
     """n random pairs of start and goal that make a task. Raises ValueError where the map is too small for it."""
     x0, y0, x1, y1 = roads.bounds
-    scale = min(1.0, math.hypot(x1 - x0, y1 - y0) / 520)
+    scale = min(1.0, math.hypot(x1 - x0, y1 - y0) / _FULL_DIAGONAL)
     low, high = (scale * length for length in _LENGTHS[task])
-    found: list[tuple[Pose, Pose]] = []
-    for _ in range(200 * n):
-        start, goal = _random_pose(roads, _FROM_STOP_LINE, rng), _random_pose(roads, 5.0, rng)
+    pairs: list[tuple[Pose, Pose]] = []
+    for _ in range(_TRIES * n):
+        start, goal = _random_pose(roads, _START_BEFORE_END, rng), _random_pose(roads, _GOAL_BEFORE_END, rng)
         try:
             route = plan_route(roads, start, goal)
         except ValueError:
             continue
         if low <= route.length <= high and _fits(route, task):
-            found.append((start, goal))
-            if len(found) == n:
-                return found
+            pairs.append((start, goal))
+            if len(pairs) == n:
+                return pairs
     raise ValueError(
-        f"found {len(found)} routes for {task} in {roads.name}, wanted {n}: the map is too small for this task"
+        f"found {len(pairs)} routes for {task} in {roads.name}, wanted {n}: give a larger map, or another --task"
     )
 
 
@@ -71,7 +79,10 @@ def _fixed_routes() -> dict[str, dict[str, list[list[list[float]]]]]:
 
 
 def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
-    """The 25 pairs of start and goal of a task; in maps that are not the package's, drawn from the seed."""
+    """The 25 pairs of start and goal of a task; on maps that are not the package's, drawn from the seed.
+
+    Raises ValueError for an unknown task and a map that is too small for it.
+    """
     if task not in TASKS:
         raise ValueError(f"found task {task!r}, wanted one of {', '.join(TASKS)}: type --task navigation")
     kind = "navigation" if task == "navigation-dynamic" else task
@@ -82,6 +93,7 @@ def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
 
 @lru_cache(maxsize=4096)  # the same in all weathers
 def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
+    """Seconds. kind: `paper` or `code`, as in `scenarios`."""
     route = plan_route(load_roads(town), start, goal)
     return route.time_limit if kind == "paper" else route.length / (5 * KMH) + 10
 
@@ -101,25 +113,28 @@ def task_scenarios(
 
     cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02).
     time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s. name: the scenarios' task,
-    where it is called something else.
+    where it is called something else. Raises ValueError for an unknown task or time limit.
     """
     if time_limit not in ("paper", "code"):
         raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: give time_limit='paper'")
-    usual = USUAL_TRAFFIC.get(town, (20, 50)) if task == "navigation-dynamic" else (0, 0)
-    n_cars, n_people = usual[0] if cars is None else cars, usual[1] if people is None else people
-    found = []
-    for i, (start, goal) in enumerate(routes(town, task, seed)):
-        limit = _time_limit(town, start, goal, time_limit)
-        found.append(Scenario(town, weather, start, goal, n_cars, n_people, limit, seed * 1000 + i, name or task))
-    return found
+    usual = USUAL_TRAFFIC.get(town, OTHER_TOWNS_TRAFFIC) if task == "navigation-dynamic" else (0, 0)
+    return [
+        Scenario(
+            town=town, weather=weather, start=start, goal=goal, n_vehicles=usual[0] if cars is None else cars,
+            n_pedestrians=usual[1] if people is None else people, time_limit=_time_limit(town, start, goal, time_limit),
+            seed=seed * 1000 + i, task=name or task,
+        )
+        for i, (start, goal) in enumerate(routes(town, task, seed))
+    ]  # fmt: skip
 
 
 def _draw_all() -> None:
+    """Draws the fixed routes of the package's towns again."""
     rng = np.random.default_rng(2018)
     drawn = {
         town: {
             task: [
-                [[round(v, 3) for v in (p.x, p.y, p.heading)] for p in pair]
+                [[round(value, 3) for value in astuple(pose)] for pose in pair]
                 for pair in draw_routes(load_roads(town), task, ROUTES_PER_TASK, rng)
             ]
             for task in _LENGTHS

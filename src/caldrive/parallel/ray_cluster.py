@@ -1,17 +1,43 @@
-"""Work for processes on one machine or many, through Ray (the extra `ray`). A worker that dies is replaced."""
+"""Work spread over one machine or many through Ray (the extra `ray`). A worker that dies is replaced."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from caldrive.parallel.processes import MOST_DEATHS
+from caldrive.parallel.processes import MAX_DEATHS
 
-T = TypeVar("T")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
-R = TypeVar("R")
+LOCAL = "local"  # in the place of an address: Ray on this machine alone
 
-LOCAL = "local"
+
+def cluster_map(
+    work: Callable[[Item], Result], items: Sequence[Item], workers: int, address: str
+) -> Iterator[tuple[Item, Result]]:
+    """Does what `processes.parallel_map` does with Ray's workers.
+
+    address: of a cluster, `auto` for the one that this machine belongs to, or `local` for so many workers on this
+    machine alone. Raises RuntimeError where Ray is missing or workers die again and again, ValueError where there is no
+    cluster.
+    """
+    ray = require_ray()
+    _connect(ray, address, workers)
+    try:
+        remote = ray.remote(max_retries=MAX_DEATHS, num_cpus=1)(_call)
+        jobs = {remote.remote(work, item): item for item in items}
+        while jobs:
+            done, _ = ray.wait(list(jobs), num_returns=1)
+            yield jobs.pop(done[0]), ray.get(done[0])
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause from None  # the work's own error, as without Ray
+    except ray.exceptions.RayError as error:
+        raise RuntimeError(
+            f"found that Ray's workers fail ({type(error).__name__}): type --workers 1 without --ray to see why"
+        ) from error
+    finally:
+        ray.shutdown()
 
 
 def require_ray() -> Any:
@@ -23,7 +49,7 @@ def require_ray() -> Any:
     return ray
 
 
-def _done(work: Callable[[T], R], item: T) -> R:
+def _call(work: Callable[[Item], Result], item: Item) -> Result:
     return work(item)
 
 
@@ -39,29 +65,3 @@ def _connect(ray: Any, address: str, workers: int) -> None:
         raise ValueError(
             f"found no Ray cluster at {address} ({error}), wanted one: type ray start --head there, or --ray {LOCAL}"
         ) from error
-
-
-def spread_over_cluster(
-    work: Callable[[T], R], items: Sequence[T], workers: int, address: str
-) -> Iterator[tuple[T, R]]:
-    """Does what `pool.spread` does with Ray's workers. address: of a cluster, `auto` for the one this machine belongs
-    to, `local` for one on this machine alone with so many workers.
-
-    Raises RuntimeError where Ray is missing or workers die again and again, ValueError where there is no cluster.
-    """
-    ray = require_ray()
-    _connect(ray, address, workers)
-    try:
-        remote = ray.remote(max_retries=MOST_DEATHS, num_cpus=1)(_done)
-        jobs = {remote.remote(work, item): item for item in items}
-        while jobs:
-            done, _ = ray.wait(list(jobs), num_returns=1)
-            yield jobs.pop(done[0]), ray.get(done[0])
-    except ray.exceptions.RayTaskError as error:
-        raise error.cause from None  # the work's own error, as without Ray
-    except ray.exceptions.RayError as error:
-        raise RuntimeError(
-            f"found that Ray's workers fail ({type(error).__name__}): type --workers 1 without --ray to see why"
-        ) from error
-    finally:
-        ray.shutdown()

@@ -1,4 +1,5 @@
-"""What a recording holds: labels counted and drawn as histograms, after all values and images could be read."""
+"""Checks a recording and says what it holds: labels counted and drawn as histograms, after all values and images could
+be read."""
 
 from __future__ import annotations
 
@@ -10,36 +11,63 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Semantic
 from caldrive.files import read_json, write_figure
 from caldrive.progress import Progress, silent
-from caldrive.recordings.folder import class_counts, episode_paths, joined, repeated
+from caldrive.recordings.folder import class_counts, duplicates, episode_paths, joined
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import MANIFEST, EpisodeError, episode_path
 
-T = TypeVar("T")
+Checked = TypeVar("Checked")
 
-HISTOGRAMS = {  # bins of the columns that the picture shows, and their unit
-    "vehicle_distance": (np.linspace(0, 50, 26), "m"),
-    "relative_angle": (np.linspace(-0.8, 0.8, 41), "rad"),
-    "center_distance": (np.linspace(-2, 2, 41), "m"),
-    "speed": (np.linspace(0, 25, 26), "m/s"),
+BINS = {  # edges of the histograms' bins, by column
+    "vehicle_distance": np.linspace(0, 50, 26),
+    "relative_angle": np.linspace(-0.8, 0.8, 41),
+    "center_distance": np.linspace(-2, 2, 41),
+    "speed": np.linspace(0, 25, 26),
 }
+UNITS = {"speed": "m/s"} | {name: spec.unit for name, spec in BY_NAME.items()}
 
 
 @dataclass(frozen=True)
-class Recording:
-    """What lies in a folder. minutes: simulated; weathers: episodes by weather; counts: frames by label and value;
-    damaged: a sentence for each file that is no use, or no use beside the others; missing: episodes that were asked for
-    and are not there."""
+class RecordingSummary:
+    """What lies in a folder."""
 
     episodes: int
+    """How many are sound."""
     frames: int
+    """How many images they have."""
     minutes: float
+    """Simulated time."""
     weathers: dict[str, int]
+    """Episodes by weather."""
     counts: dict[str, dict[str, int]]
+    """Frames by label and value."""
     damaged: tuple[str, ...]
+    """A sentence for each file that is no use, or no use beside the others."""
     missing: int = 0
+    """Episodes that were asked for and are not there."""
+
+
+def check_recording(folder: Path, progress: Progress = silent) -> tuple[RecordingSummary, list[Episode]]:
+    """Reads all episodes of a folder; returns what they hold, and those that are sound.
+
+    Raises EpisodeError where there is no episode at all.
+    """
+    sound, damaged = _check_each(check_episode, episode_paths(folder), progress)
+    damaged += duplicates(sound) + _of_another_size(sound)
+    missing, unreadable = _check_each(_missing, sorted(folder.glob(f"**/{MANIFEST}")))
+    summary = RecordingSummary(
+        episodes=len(sound),
+        frames=sum(map(len, sound)),
+        minutes=sum(float(np.ptp(episode.columns["time"])) for episode in sound) / 60,
+        weathers=dict(Counter(str(episode.scenario.weather) for episode in sound)),
+        counts=class_counts(sound) if sound else {},
+        damaged=(*damaged, *unreadable),
+        missing=sum(missing),
+    )
+    return summary, sound
 
 
 def check_episode(path: Path) -> Episode:
@@ -58,10 +86,10 @@ def _missing(manifest: Path) -> int:
     """How many of the episodes that `caldrive collect` was asked for are not in its folder. Raises EpisodeError where
     nobody can read what was asked for."""
     try:
-        asked = read_json(manifest.read_bytes(), dict[str, Any]).get("episodes", 0)
-        if asked < 0:
-            raise ValueError(f"{asked} episodes")
-        return sum(not episode_path(manifest.parent, k).is_file() for k in range(asked))
+        wanted = read_json(manifest.read_bytes(), dict[str, Any]).get("episodes", 0)
+        if wanted < 0:
+            raise ValueError(f"{wanted} episodes")
+        return sum(not episode_path(manifest.parent, k).is_file() for k in range(wanted))
     except (ValueError, TypeError) as error:
         raise EpisodeError(f"{manifest} is damaged ({error}): record in another folder") from error
 
@@ -77,8 +105,10 @@ def _of_another_size(episodes: list[Episode]) -> list[str]:
     ]
 
 
-def _tried(check: Callable[[Path], T], paths: list[Path], progress: Progress = silent) -> tuple[list[T], list[str]]:
-    """What a check makes of the files that are sound, and a sentence for each of the others."""
+def _check_each(
+    check: Callable[[Path], Checked], paths: list[Path], progress: Progress = silent
+) -> tuple[list[Checked], list[str]]:
+    """What a check returns for the files that are sound, and a sentence for each of the others."""
     sound, damaged = [], []
     for k, path in enumerate(paths):
         progress("checking", k / len(paths))
@@ -89,22 +119,6 @@ def _tried(check: Callable[[Path], T], paths: list[Path], progress: Progress = s
     return sound, damaged
 
 
-def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recording, list[Episode]]:
-    """Reads all episodes of a folder; returns what they hold, and those that are sound.
-
-    Raises EpisodeError where there is no episode at all.
-    """
-    sound, damaged = _tried(check_episode, episode_paths(folder), progress)
-    damaged += repeated(sound) + _of_another_size(sound)
-    missing, unknown = _tried(_missing, sorted(folder.glob(f"**/{MANIFEST}")))
-    minutes = sum(float(np.ptp(e.columns["time"])) for e in sound) / 60
-    weathers = Counter(str(e.scenario.weather) for e in sound)
-    counts = class_counts(sound) if sound else {}
-    return Recording(
-        len(sound), sum(map(len, sound)), minutes, dict(weathers), counts, (*damaged, *unknown), sum(missing)
-    ), sound
-
-
 def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], path: Path) -> None:
     """A picture (PNG) of how often each value of each label occurs, all on one logarithmic scale of frames."""
     from matplotlib.figure import Figure
@@ -112,9 +126,9 @@ def draw_histograms(episodes: list[Episode], counts: dict[str, dict[str, int]], 
     figure = Figure(figsize=(16, 6), layout="constrained")
     axes = figure.subplots(2, 5, sharey=True).ravel()
     for ax, (name, values) in zip(axes, counts.items(), strict=False):
-        ax.bar([one.replace(" or ", " or\n") for one in values], list(values.values()), color="#3b6ea5")
+        ax.bar([value.replace(" or ", " or\n") for value in values], list(values.values()), color="#3b6ea5")
         ax.set(title=name.replace("_", " "), yscale="log", ylabel="frames")
-    for ax, (name, (bins, unit)) in zip(axes[len(counts) :], HISTOGRAMS.items(), strict=False):
+    for ax, (name, bins) in zip(axes[len(counts) :], BINS.items(), strict=False):
         ax.hist(joined(episodes, name), bins, color="#c8782d")
-        ax.set(title=name.replace("_", " "), yscale="log", xlabel=unit)
+        ax.set(title=name.replace("_", " "), yscale="log", xlabel=UNITS[name])
     write_figure(path, figure)

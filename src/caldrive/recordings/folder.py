@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.affordances import SPECS
+from caldrive.affordances import DISCRETE
 from caldrive.datatypes import HAZARD_DISTANCE
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError
@@ -29,18 +29,19 @@ def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
     Raises EpisodeError where there is none, one is damaged, or one is there twice.
     """
     episodes = [read_episode(path, semantic) for path in episode_paths(folder)]
-    if again := repeated(episodes):
-        raise EpisodeError(again[0])
+    if sentences := duplicates(episodes):
+        raise EpisodeError(sentences[0])
     return episodes
 
 
-def repeated(episodes: Sequence[Episode]) -> list[str]:
+def duplicates(episodes: Sequence[Episode]) -> list[str]:
     """A sentence for each episode that is there again: one that trains must not validate, too."""
     first = {episode.key: episode for episode in reversed(episodes)}
     again = [episode for episode in episodes if first[episode.key] is not episode]
     return [
-        f"{one.path} has id, town, weather and seed of {first[one.key].path}: keep one, or record with another --seed"
-        for one in again
+        f"{episode.path} has id, town, weather and seed of {first[episode.key].path}: keep one, or record with another "
+        "--seed"
+        for episode in again
     ]
 
 
@@ -52,30 +53,35 @@ def joined(episodes: Sequence[Episode], name: str) -> NDArray[Any]:
 def class_counts(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
     """How many frames of a recording have each value of the discrete affordances and of the command, turn each way in a
     junction, and have to stop for a person or a car across and not for the car ahead."""
-    columns = {name: joined(episodes, name) for name in (*(s.name for s in SPECS if s.discrete), "command")}
+    columns = {name: joined(episodes, name) for name in (*(spec.name for spec in DISCRETE), "command")}
     columns["turn"] = columns["command"][joined(episodes, "junction")]
     near = joined(episodes, "vehicle_distance")[columns["hazard_stop"] > 0] < HAZARD_DISTANCE
     columns["hazard_by"] = np.where(near, "car ahead", "person or car across")
-    found = {}
+    counts = {}
     for name, column in columns.items():
-        values, counts = np.unique(column, return_counts=True)
-        found[name] = {_short(v): int(n) for v, n in zip(values, counts, strict=True)}
-    return found
+        values, numbers = np.unique(column, return_counts=True)
+        counts[name] = {_text(value): int(n) for value, n in zip(values, numbers, strict=True)}
+    return counts
 
 
-def _short(value: Any) -> str:
+def _text(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
 def split(episodes: Sequence[Episode], share: float, seed: int) -> tuple[list[Episode], list[Episode]]:
-    """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for
-    each."""
+    """Training and validation episodes: whole episodes, because neighbouring frames look alike. At least one for each.
+
+    share: of the episodes that validate. Raises EpisodeError for fewer than two episodes.
+    """
     if len(episodes) < 2:
         raise EpisodeError(f"found {len(episodes)} episode, training and validation need one each: record more")
     order = np.random.default_rng(seed).permutation(len(episodes))
-    n_held = min(max(1, round(share * len(episodes))), len(episodes) - 1)
-    held = set(order[:n_held].tolist())
-    return [e for i, e in enumerate(episodes) if i not in held], [e for i, e in enumerate(episodes) if i in held]
+    n_validation = min(max(1, round(share * len(episodes))), len(episodes) - 1)
+    validation = set(order[:n_validation].tolist())
+    return (
+        [episode for i, episode in enumerate(episodes) if i not in validation],
+        [episode for i, episode in enumerate(episodes) if i in validation],
+    )
 
 
 def held_out(episodes: Sequence[Episode], keys: Sequence[str]) -> list[Episode]:
@@ -84,10 +90,10 @@ def held_out(episodes: Sequence[Episode], keys: Sequence[str]) -> list[Episode]:
     Raises EpisodeError where they are not all among these episodes.
     """
     wanted = set(keys)
-    found = [episode for episode in episodes if episode.key in wanted]
-    if not wanted or len(found) != len(wanted):
+    kept = [episode for episode in episodes if episode.key in wanted]
+    if not wanted or len(kept) != len(wanted):
         raise EpisodeError(
-            f"found {len(found)} of the {len(wanted)} episodes that the network's training kept for validation: give "
+            f"found {len(kept)} of the {len(wanted)} episodes that the network's training kept for validation: give "
             "the folder that it was trained on with --data, or leave --held-out away"
         )
-    return found
+    return kept

@@ -1,7 +1,7 @@
-"""A recorded episode on disk, its format and its writer: one Parquet file, one row for each frame of each camera.
+"""A recorded episode on disk: its format and its writer. One Parquet file, one row for each frame of each camera.
 
-Images are JPEG bytes; a semantic image, where one was asked for, is a zipped byte a pixel. The scenario, the episode's
-id and the version of the format lie as JSON in the schema's metadata.
+Images are JPEG bytes; a semantic image, where one was asked for, is one byte for each pixel, compressed by zlib. The
+scenario, the episode's id and the version of the format lie as JSON in the schema's metadata.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 import simplejpeg
 from numpy.typing import NDArray
 
+from caldrive.affordances import CONDITIONAL, SPECS, AffordanceSpec
 from caldrive.datatypes import Affordances, Alternative, Command, Control, Image
 from caldrive.files import write_whole
 from caldrive.scenarios import Scenario, scenario_values
@@ -28,13 +29,16 @@ FORMAT_VERSION = 4
 METADATA_KEY = b"caldrive"
 MANIFEST = "manifest.json"  # of a folder of episodes: what was asked for
 JPEG_QUALITY = 90
-LABELS = tuple(f.name for f in fields(Affordances))
+LABELS = tuple(spec.name for spec in SPECS)
+CONTROLS = tuple(field.name for field in fields(Control))
+OTHER_LABELS = tuple(spec.name for spec in CONDITIONAL)  # what another command would ask for
+FRAME_COLUMNS = ("camera", "camera_left", "camera_yaw", "time", "speed", "junction")  # fields of a Frame, as they are
 
-CONTROLS = tuple(f.name for f in fields(Control))
 
-OTHER = ("relative_angle", "center_distance")
+def _label_type(spec: AffordanceSpec) -> pa.DataType:
+    """Whole numbers for classes, such as the limits on signs, and floats for probabilities, m and rad."""
+    return pa.int64() if spec.discrete and not spec.binary else pa.float64()
 
-PLAIN = ("camera", "camera_left", "camera_yaw", "time", "speed", "junction")
 
 SCHEMA = pa.schema(
     [
@@ -45,13 +49,12 @@ SCHEMA = pa.schema(
         ("command", pa.string()),
         ("junction", pa.bool_()),
         ("other_command", pa.string()),  # empty where no other one could be given
-        *((f"other_{name}", pa.float64()) for name in OTHER),
-        *((name, pa.int64() if name == "speed_sign" else pa.float64()) for name in LABELS),
+        *((f"other_{name}", pa.float64()) for name in OTHER_LABELS),
+        *((spec.name, _label_type(spec)) for spec in SPECS),
         *((f"{kind}_{name}", pa.float64()) for kind in ("driven", "clean") for name in CONTROLS),
         ("image", pa.binary()),
     ]
 )
-
 SEMANTIC = pa.field("semantic", pa.binary())  # only in recordings that were asked for it
 
 
@@ -66,49 +69,58 @@ class EpisodeError(ValueError):
 
 @dataclass(frozen=True)
 class Frame:
-    """One camera's view at one moment.
-
-    index: number of the moment, from 0. camera: its id, with its lateral offset (m, + left) and yaw (rad, + left).
-    affordances: the labels as of a car that stands where the camera looks from. driven: the control that moved the car,
-    clean: what the driver wanted before any noise was added. semantic (H, W): the class of each pixel, by number.
-    junction: whether the car is inside one, where no line is painted. other: what another command would ask for.
-    """
+    """One camera's view in one step of an episode."""
 
     index: int
+    """The number of the step, from 0."""
     time: float
+    """s since the start of the episode."""
     speed: float
+    """Of the car, m/s."""
     command: Command
+    """What the navigation system asks for."""
     affordances: Affordances
+    """The labels, as of a car that stands where the camera looks from."""
     driven: Control
+    """The control that moved the car."""
     clean: Control
+    """What the driver wanted, before any perturbation."""
     image: Image
+    """(H, W, 3), RGB."""
     camera: int = 0
+    """The number of the camera."""
     camera_left: float = 0.0
+    """m to the left of the car's middle."""
     camera_yaw: float = 0.0
+    """rad to the left."""
     semantic: NDArray[np.uint8] | None = None
+    """(H, W), the class of each pixel, by number."""
     junction: bool = False
+    """Whether the car is inside a junction, where no line is painted."""
     other: Alternative | None = None
+    """What another command would ask for, if another one could be given."""
 
 
 def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
-    labels = asdict(frame.affordances) | {"speed_sign": frame.affordances.speed_sign or 0}
-    driven = {f"driven_{name}": value for name, value in asdict(frame.driven).items()}
-    clean = {f"clean_{name}": value for name, value in asdict(frame.clean).items()}
-    plain = {name: getattr(frame, name) for name in PLAIN}
-    other = {f"other_{name}": getattr(frame.other, name) if frame.other else 0.0 for name in OTHER}
-    other["other_command"] = frame.other.command.value if frame.other else ""
+    """A frame as a row of SCHEMA."""
     # 4:4:4 keeps the colour of lamps that are a pixel or two wide.
     jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
-    named = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
+    row = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
+    row |= {name: getattr(frame, name) for name in FRAME_COLUMNS}
+    row |= {name: 0 if value is None else value for name, value in asdict(frame.affordances).items()}  # 0 for no sign
+    row |= {f"driven_{name}": value for name, value in asdict(frame.driven).items()}
+    row |= {f"clean_{name}": value for name, value in asdict(frame.clean).items()}
+    row |= {f"other_{name}": getattr(frame.other, name) if frame.other else 0.0 for name in OTHER_LABELS}
+    row["other_command"] = frame.other.command.value if frame.other else ""
     if frame.semantic is not None:
-        named[SEMANTIC.name] = zlib.compress(frame.semantic.tobytes(), 1)
-    return named | plain | other | labels | driven | clean
+        row[SEMANTIC.name] = zlib.compress(frame.semantic.tobytes(), 1)
+    return row
 
 
 class EpisodeWriter:
     """Gathers frames and writes the file whole on `close`; as a context manager it discards them on an error.
 
-    Frames of one moment may come camera by camera. An existing file of that name is replaced.
+    Frames of one step may come camera by camera. An existing file of that name is replaced.
     """
 
     def __init__(self, path: Path | str, scenario: Scenario, id: str = "", quality: int = JPEG_QUALITY) -> None:
@@ -119,6 +131,7 @@ class EpisodeWriter:
         self._rows: list[dict[str, Any]] = []
 
     def append(self, frame: Frame) -> None:
+        """One more frame."""
         self._rows.append(_row(self.id, frame, self.quality))
 
     def close(self) -> None:

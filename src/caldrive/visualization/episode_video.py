@@ -1,4 +1,4 @@
-"""A video file: H.264 in MP4, which every browser plays. It appears whole or not at all."""
+"""Videos: a writer of MP4 files, and the film of an episode that is made with it."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from caldrive.visualization.minimap import MiniMap
 from caldrive.world.scene.weather import weather
 
 FALLBACK_CODEC = "mpeg4"  # for builds of FFmpeg without x264
+LAST_FRAMES = 15  # that the outcome stays on the screen
 
 
 class VideoWriter:
-    """Frames (H, W, 3) of one even size in, one MP4 out. rate: frames in a second.
+    """Frames (H, W, 3) of one even size in, one MP4 out, in H.264, which every browser plays. rate: frames a second.
 
-    Use it in a `with` block: the file takes its name at the block's end. After an error or without a frame there is
-    none.
+    Use it in a `with` block: the file appears whole at the block's end, and not at all after an error or without a
+    frame.
     """
 
     def __init__(self, path: Path, rate: float = 10.0) -> None:
@@ -74,21 +75,21 @@ class VideoWriter:
             self._temporary.unlink(missing_ok=True)
 
 
-LAST_FRAMES = 15  # that the outcome stays on the screen
-
-
 def caption(scenario: Scenario, number: int, of: int) -> str:
     """One line that says where and under which conditions the car drives."""
-    sky = weather(scenario.weather)
-    town = scenario.town.rsplit("/", 1)[-1]
+    conditions = weather(scenario.weather)
+    town = Path(scenario.town).name
     count = f"   episode {number} of {of}" if of > 1 else ""
-    return f"{town}   {scenario.task}   weather {sky.id} {sky.name}{count}"
+    return f"{town}   {scenario.task}   weather {conditions.id} {conditions.name}{count}"
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What a film says beside the picture: a caption, the scenario, what the referee has counted so far (a list that
-    grows), and whether the true affordances stand beside those the agent goes by."""
+    """What a film shows beside the camera's picture.
+
+    infractions: those that the referee has counted so far, a list that grows. truth: whether the true affordances stand
+    beside those that the agent goes by.
+    """
 
     caption: str
     scenario: Scenario

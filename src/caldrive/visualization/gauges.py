@@ -1,24 +1,32 @@
-"""Colours, letters and bars for pictures: the few strokes of which the head-up display is made."""
+"""The affordances as gauges, and the letters and bars of which these and the rest of the head-up display are made.
+
+What an affordance is (its name, range and unit) stands in `affordances.SPECS`; here is only how each is drawn.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 from PIL import ImageDraw, ImageFont
 
-from caldrive.datatypes import MAX_CENTER_DISTANCE, MAX_VEHICLE_DISTANCE, SPEED_SIGNS, Affordances
+from caldrive.affordances import SPECS, AffordanceSpec
+from caldrive.datatypes import Affordances
 
 Color = tuple[int, int, int]
 Draw = ImageDraw.ImageDraw
 Box = tuple[float, float, float, float]  # left, top, right, bottom in pixels
+
 BACKGROUND, TRACK = (18, 20, 24), (48, 53, 61)
-
-TEXT, MUTED = (238, 240, 243), (150, 157, 167)
-
+TEXT, MUTED, DARK_TEXT = (238, 240, 243), (150, 157, 167), (20, 20, 20)
 BLUE, GREEN, RED, AMBER = (72, 145, 245), (52, 190, 105), (232, 72, 62), (245, 170, 50)
+
+LEFT, TOP, HEIGHT = 322, 46, 174  # pixels: where the gauges begin, and the height of all of them
+ROW = HEIGHT / len(SPECS)
+BAR_LEFT, BAR_RIGHT, VALUE, TRUE = LEFT + 130, LEFT + 258, LEFT + 330, LEFT + 392
+NOT_GIVEN, NO_NUMBER = "-", "?"  # the letters of Pillow have no longer dash
 
 
 @lru_cache(maxsize=16)
@@ -50,85 +58,112 @@ def tick(draw: Draw, box: Box, share: float, color: Color = TEXT) -> None:
     draw.rectangle((x - 1, box[1] - 3, x + 1, box[3] + 3), fill=color)
 
 
-LEFT, TOP, ROW = 322, 46, 29  # pixels: where the gauges begin, and the height of each
-BAR_LEFT, BAR_RIGHT, VALUE, TRUE = LEFT + 130, LEFT + 258, LEFT + 330, LEFT + 392
-WIDEST_ANGLE = math.radians(60)
-
-
 @dataclass(frozen=True)
 class Gauge:
-    """label: how it is called; share: where on the bar a value lies; rest: the bar's share of a value of nothing."""
+    """How an affordance is drawn. reach: the value at the end of its bar, where that is not the end of its range."""
 
-    name: str
-    label: str
-    share: Callable[[float], float]
-    text: Callable[[float], str]
-    color: Color
-    rest: float = 0.0
+    color: Color = BLUE
+    reach: float | None = None
 
 
-def _percent(value: float) -> str:
-    return f"{100 * value:.0f} %"
+GAUGES: Mapping[str, Gauge] = {  # by the affordance's name; another one is drawn as Gauge() says
+    "hazard_stop": Gauge(RED),
+    "red_light": Gauge(RED),
+    "vehicle_distance": Gauge(AMBER),
+    "relative_angle": Gauge(BLUE, reach=math.radians(60)),
+    "center_distance": Gauge(BLUE),
+}
 
 
-GAUGES = (
-    Gauge("hazard_stop", "hazard stop", lambda p: p, _percent, RED),
-    Gauge("red_light", "red light", lambda p: p, _percent, RED),
-    Gauge("speed_sign", "speed sign", lambda v: v, lambda v: f"{v:.0f}" if v else "none", TEXT),
-    Gauge("vehicle_distance", "vehicle ahead", lambda d: d / MAX_VEHICLE_DISTANCE, lambda d: f"{d:.1f} m", AMBER, 1.0),
-    # The bars of what lies to the left grow to the left.
-    Gauge("relative_angle", "relative angle", lambda a: 0.5 - a / WIDEST_ANGLE / 2,
-          lambda a: f"{math.degrees(a):+.1f}°", BLUE, 0.5),
-    Gauge("center_distance", "centre distance", lambda d: 0.5 - d / MAX_CENTER_DISTANCE / 2,
-          lambda d: f"{d:+.2f} m", BLUE, 0.5),
-)  # fmt: skip
+def _gauge(spec: AffordanceSpec) -> Gauge:
+    return GAUGES.get(spec.name, Gauge())
 
 
-def _box(row: int) -> Box:
-    middle = TOP + ROW * (row + 0.5)
-    return BAR_LEFT, middle - 5, BAR_RIGHT, middle + 5
+def _value(spec: AffordanceSpec, affordances: Affordances | None) -> float | None:
+    """An affordance as a number, 0 for none; None where there are no affordances."""
+    return None if affordances is None else float(getattr(affordances, spec.name) or 0.0)
 
 
-def _sign_box(row: int, i: int) -> Box:
-    box, width = _box(row), (BAR_RIGHT - BAR_LEFT - 8) / 3
-    left = box[0] + i * (width + 4)
-    return left, box[1] - 4, left + width, box[3] + 4
+def _share(spec: AffordanceSpec, value: float) -> float:
+    """Where on its bar a value lies, from 0 to 1. What lies to the left of the car lies to the left on the bar."""
+    high = _gauge(spec).reach or spec.high
+    if spec.low < 0:
+        return 0.5 - value / high / 2
+    return (value - spec.low) / (high - spec.low)
+
+
+def _text(spec: AffordanceSpec, value: float | None) -> str:
+    """A value as people read it: percent, metres, degrees, or the number on a sign."""
+    if value is None:
+        return NOT_GIVEN
+    if not math.isfinite(value):
+        return NO_NUMBER
+    if spec.binary:
+        return f"{100 * value:.0f} %"
+    if spec.discrete:
+        return f"{value:.0f}" if value else "none"
+    if spec.unit == "rad":
+        return f"{math.degrees(value):+.1f}°"
+    return f"{value:+.2f} {spec.unit}" if spec.low < 0 else f"{value:.1f} {spec.unit}"
+
+
+def _middle(row: int) -> float:
+    """The height at which the gauge of a row lies."""
+    return TOP + ROW * (row + 0.5)
+
+
+def _bar(row: int) -> Box:
+    return BAR_LEFT, _middle(row) - 5, BAR_RIGHT, _middle(row) + 5
+
+
+def _has_bar(spec: AffordanceSpec) -> bool:
+    """A bar shows a share; one of several classes has a box for each."""
+    return spec.binary or not spec.discrete
 
 
 def draw_frame(draw: Draw, truth: bool) -> None:
-    """What never changes: names and empty bars."""
+    """What never changes: names and empty bars. truth: whether there is a column for the true values."""
     write(draw, (VALUE, TOP - 12), "seen" if truth else "value", 13, MUTED, "rm")
     if truth:
         write(draw, (TRUE, TOP - 12), "true", 13, MUTED, "rm")
     write(draw, (LEFT, TOP - 12), "affordances", 13, MUTED)
-    for row, gauge in enumerate(GAUGES):
-        write(draw, (LEFT, TOP + ROW * (row + 0.5)), gauge.label, 15)
-        if gauge.name != "speed_sign":
-            track(draw, _box(row))
+    for row, spec in enumerate(SPECS):
+        write(draw, (LEFT, _middle(row)), spec.title, 15)
+        if _has_bar(spec):
+            track(draw, _bar(row))
 
 
-def draw_gauges(draw: Draw, seen: Affordances, true: Affordances | None) -> None:
-    """All six values; true: None leaves the truth out."""
-    for row, gauge in enumerate(GAUGES):
-        value = float(getattr(seen, gauge.name) or 0.0)
-        real = None if true is None else float(getattr(true, gauge.name) or 0.0)
-        middle = TOP + ROW * (row + 0.5)
-        write(draw, (VALUE, middle), gauge.text(value) if math.isfinite(value) else "?", 16, TEXT, "rm")
+def draw_gauges(draw: Draw, seen: Affordances | None, true: Affordances | None) -> None:
+    """The values, over a frame by `draw_frame`. seen: None where the agent gives none; true: None leaves it out."""
+    for row, spec in enumerate(SPECS):
+        value, real = _value(spec, seen), _value(spec, true)
+        write(draw, (VALUE, _middle(row)), _text(spec, value), 16, MUTED if value is None else TEXT, "rm")
         if real is not None:
-            write(draw, (TRUE, middle), gauge.text(real), 13, MUTED, "rm")
-        if gauge.name == "speed_sign":
-            _draw_signs(draw, row, value, real)
-        elif math.isfinite(value):
-            fill(draw, _box(row), gauge.rest, gauge.share(value), gauge.color)
-            if real is not None:
-                tick(draw, _box(row), gauge.share(real))
+            write(draw, (TRUE, _middle(row)), _text(spec, real), 13, MUTED, "rm")
+        if _has_bar(spec):
+            _fill_bar(draw, row, value, real)
+        else:
+            _draw_classes(draw, row, value, real)
 
 
-def _draw_signs(draw: Draw, row: int, value: float, real: float | None) -> None:
-    for i, sign in enumerate(SPEED_SIGNS):
-        box, lit = _sign_box(row, i), value == sign
-        draw.rounded_rectangle(
-            box, 4, fill=TEXT if lit else TRACK, outline=RED if lit or real == sign else None, width=2
-        )
-        middle = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
-        write(draw, middle, str(sign), 13, (20, 20, 20) if lit else MUTED, "mm")
+def _fill_bar(draw: Draw, row: int, value: float | None, real: float | None) -> None:
+    """A bar from where the affordance says nothing (nobody ahead, no angle) to its value, and a mark at the truth."""
+    spec = SPECS[row]
+    if value is not None and math.isfinite(value):
+        rest = _value(spec, Affordances()) or 0.0
+        fill(draw, _bar(row), _share(spec, rest), _share(spec, value), _gauge(spec).color)
+    if real is not None:
+        tick(draw, _bar(row), _share(spec, real))
+
+
+def _draw_classes(draw: Draw, row: int, value: float | None, real: float | None) -> None:
+    """A box for each class but the first, which stands for none; the one that is seen is lit."""
+    left, top, right, bottom = _bar(row)
+    classes, gap = SPECS[row].classes[1:], 4
+    width = (right - left + gap) / len(classes)
+    for k, number in enumerate(classes):
+        box = (left + k * width, top - 4, left + (k + 1) * width - gap, bottom + 4)
+        lit = value == number
+        outline = RED if number in (value, real) else None
+        draw.rounded_rectangle(box, 4, fill=TEXT if lit else TRACK, outline=outline, width=2)
+        write(draw, ((box[0] + box[2]) / 2, _middle(row)), str(number), 13, DARK_TEXT if lit else MUTED, "mm")

@@ -18,19 +18,20 @@ import pytest
 import simplejpeg
 from rich.console import Console
 
-from caldrive.benchmark.evidence import trace_path
+from caldrive.benchmark.artifacts import trace_path
 from caldrive.benchmark.report import page as page_module
-from caldrive.benchmark.report.figures import _error_sums
+from caldrive.benchmark.report.figures import error_sums
 from caldrive.benchmark.report.page import report_page, report_text
 from caldrive.benchmark.report.runs import BenchmarkRun, failures, load_run, load_runs
 from caldrive.benchmark.report.tables import tables
-from caldrive.benchmark.suites import Driven, suite
+from caldrive.benchmark.suites import TrialResult, suite
 from caldrive.commands.tables import benchmark_table
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome, result_values
+from caldrive.scenarios import Scenario
 from tests.benchmark.traces import after, trace
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-ABOUT: dict[str, Any] = {
+DESCRIPTION: dict[str, Any] = {
     "suite": "quick", "agent": "cal", "model": "abc", "cap": 20.0, "code": "123", "began": "2026-01-02T03:04:05+00:00",
     "machine": "two cores", "seed": 0, "time_limit": "paper", "controller": "default", "model_file": None,
     "suite_content": None, "precision": "int8", "workers": 2,
@@ -39,53 +40,62 @@ COMFORT = {
     "center_distance": 0.05, "jerk": 0.4, "lateral_straight": 0.1, "lateral_turn": 0.2, "turning": 10.0,
     "comfortable": 0.9,
 }  # fmt: skip
-FIGURES: dict[str, Any] = {
+METRICS: dict[str, Any] = {
     "reds_obeyed": 3, "off_lane": 0.0, "error/hazard_stop": 0.01, "error/red_light": 0.0,
     "error/speed_sign": 0.02, "error/vehicle_distance": 0.5, "error/relative_angle": 0.02,
     "error/center_distance": 0.1, "before/0/relative_angle": 0.3, "before/0/hazard_stop": 0.5,
 }  # fmt: skip
 
 
+def episode(
+    scenario: Scenario, outcome: Outcome, infractions: tuple[Infraction, ...], comfort: dict[str, float]
+) -> EpisodeResult:
+    """An episode of 50 s and 250 m."""
+    return EpisodeResult(
+        scenario=scenario, outcome=outcome, duration=50.0, distance=250.0, route_done=200.0, route_length=250.0,
+        infractions=infractions, comfort=comfort,
+    )  # fmt: skip
+
+
 def run(name: str, folder: Path) -> BenchmarkRun:
     """The quick suite, driven well but for every fifth episode."""
-    driven = []
+    results = []
     for k, trial in enumerate(suite("quick")):
-        bad = k % 5 == 4
         kind = InfractionKind.SIDEWALK if k % 2 else InfractionKind.RED_LIGHT
-        broken = (Infraction(kind, 12.5, 100.0, 90.0),) if bad else ()
+        infractions = (Infraction(kind, time=12.5, x=100.0, y=90.0),) if k % 5 == 4 else ()
         outcome = Outcome.TIMEOUT if k % 10 == 4 else Outcome.SUCCESS
-        result = EpisodeResult(trial.scenario, outcome, 50.0, 250.0, 200.0, 250.0, broken, COMFORT)
-        driven.append(Driven(trial, result, FIGURES))
-    return BenchmarkRun(name, folder, ABOUT | {"agent": name}, tuple(driven))
+        results.append(TrialResult(trial, episode(trial.scenario, outcome, infractions, COMFORT), METRICS))
+    return BenchmarkRun(name, folder, DESCRIPTION | {"agent": name}, tuple(results))
 
 
 def test_names_with_brackets_stand_in_the_terminals_tables_as_they_are(tmp_path: Path) -> None:
-    (one, *_) = run("cal", tmp_path).driven
-    trial = replace(one.trial, condition="[/wet]", scenario=replace(one.trial.scenario, task="[bold]turn"))
+    (result, *_) = run("cal", tmp_path).results
+    trial = replace(result.trial, condition="[/wet]", scenario=replace(result.trial.scenario, task="[bold]turn"))
     console = Console(width=200, record=True, file=io.StringIO())
-    console.print(benchmark_table([replace(one, trial=trial)], "out/[red]"))
-    said = console.export_text()
-    assert said.count("[/wet]") == 2
-    assert "[bold]turn" in said
-    assert "out/[red]" in said
+    console.print(benchmark_table([replace(result, trial=trial)], "out/[red]"))
+    text = console.export_text()
+    assert text.count("[/wet]") == 2
+    assert "[bold]turn" in text
+    assert "out/[red]" in text
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
-    made = [run(name, tmp_path_factory.mktemp(name)) for name in ("oracle", "cal")]
-    still = made[1].folder / "stills" / f"{made[1].driven[4].trial.key}-0.jpg"
+    both = [run(name, tmp_path_factory.mktemp(name)) for name in ("oracle", "cal")]
+    folder, key = both[1].folder, both[1].results[4].trial.key
+    still = folder / "stills" / f"{key}-0.jpg"
     still.parent.mkdir()
     still.write_bytes(simplejpeg.encode_jpeg(np.full((20, 40, 3), 90, np.uint8)))
     left = {"trace": trace(true_center_distance=after(200, 1.5), command="left")}
-    kept = trace_path(made[1].folder, made[1].driven[4].trial.key)
-    kept.parent.mkdir()
-    kept.write_bytes(gzip.compress(json.dumps(left).encode()))
-    return made
+    path = trace_path(folder, key)
+    path.parent.mkdir()
+    path.write_bytes(gzip.compress(json.dumps(left).encode()))
+    return both
 
 
 def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
-    table = next(one for one in tables(runs) if one.title == "How missed goals began")
-    town = runs[1].driven[4].trial.scenario.town
+    table = next(one for one in tables(runs) if one.title == "Failure causes")
+    town = runs[1].results[4].trial.scenario.town
     assert table.rows == (("cal", town, "left its lane", "(100, 0)", "left", "1"),)
     text = "left its lane at (100, 0), left: relative angle off by 0.00 rad"
     assert text in report_text(runs)
@@ -112,8 +122,8 @@ def test_infractions_stand_beside_table_2(runs: list[BenchmarkRun]) -> None:
 
 def test_failures_say_what_was_wrong_before(runs: list[BenchmarkRun]) -> None:
     found = failures(runs)
-    assert len(found) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].driven)))
-    assert found[0].before == ("relative angle 0.30 rad, hazard stop 50 %",)
+    assert len(found) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].results)))
+    assert found[0].errors_before == ("relative angle 0.30 rad, hazard stop 50 %",)
 
 
 def test_the_text_holds_all_tables_and_failures(runs: list[BenchmarkRun]) -> None:
@@ -126,8 +136,8 @@ def test_the_text_holds_all_tables_and_failures(runs: list[BenchmarkRun]) -> Non
 
 
 def test_the_command_says_all_that_is_not_usual(runs: list[BenchmarkRun]) -> None:
-    about = {"seed": 3, "time_limit": "code", "controller": "paper", "cap": None, "model_file": "/a/b.safetensors"}
-    assert replace(runs[0], about=runs[0].about | about).command == (
+    change = {"seed": 3, "time_limit": "code", "controller": "paper", "cap": None, "model_file": "/a/b.safetensors"}
+    assert replace(runs[0], description=runs[0].description | change).command == (
         "caldrive benchmark --suite quick --agent oracle --signs --controller paper --time-limit code --seed 3 "
         "--model /a/b.safetensors --out DIR"
     )
@@ -135,12 +145,12 @@ def test_the_command_says_all_that_is_not_usual(runs: list[BenchmarkRun]) -> Non
 
 def test_runs_of_one_agent_are_told_apart_by_their_folders(tmp_path: Path) -> None:
     (trial, *_) = suite("quick")
-    result = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), COMFORT)
+    result = episode(trial.scenario, Outcome.SUCCESS, (), COMFORT)
     folders = [tmp_path / "a" / "cal", tmp_path / "b" / "cal"]
     for folder in folders:
         folder.mkdir(parents=True)
-        (folder / "run.json").write_text(json.dumps(ABOUT))
-        line = {"key": trial.key, "result": result_values(result), "figures": FIGURES}
+        (folder / "run.json").write_text(json.dumps(DESCRIPTION))
+        line = {"key": trial.key, "result": result_values(result), "figures": METRICS}
         (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
     assert [run.name for run in load_runs(folders)] == ["cal (a/cal)", "cal (b/cal)"]
     assert [run.name for run in load_runs(folders[:1])] == ["cal"]
@@ -155,9 +165,9 @@ def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
 
 def test_results_without_figures_of_comfort_are_named(tmp_path: Path) -> None:
     (trial, *_) = suite("quick")
-    old = EpisodeResult(trial.scenario, Outcome.SUCCESS, 50.0, 250.0, 200.0, 250.0, (), {"jerk": 0.4})
+    old = episode(trial.scenario, Outcome.SUCCESS, (), {"jerk": 0.4})
     line = {"key": trial.key, "result": result_values(old), "figures": {}}
-    (tmp_path / "run.json").write_text(json.dumps(ABOUT))
+    (tmp_path / "run.json").write_text(json.dumps(DESCRIPTION))
     (tmp_path / "results.jsonl").write_text(json.dumps(line) + "\n")
     with pytest.raises(ValueError, match="older caldrive"):
         load_run(tmp_path)
@@ -169,7 +179,7 @@ def test_two_runs_write_the_same_page(runs: list[BenchmarkRun]) -> None:
 
 def test_a_blind_frame_is_off_by_nothing_that_counts() -> None:
     seen = trace(predicted_center_distance=[None] * 300 + [0.5] * 300)
-    count, wrong = _error_sums(seen, "center_distance")
+    count, wrong = error_sums(seen, "center_distance")
     assert (count.sum(), wrong.sum()) == (300, pytest.approx(150))
     assert list(np.flatnonzero(count)) == [6, 7, 8, 9, 10, 11]  # from 30 s on, in slots of 5 s
 
@@ -201,13 +211,13 @@ def page(runs: list[BenchmarkRun], tmp_path_factory: pytest.TempPathFactory) -> 
 def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
     runs: list[BenchmarkRun], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page_module, "MOST_STILLS", 1)
-    slow, breaker = runs[1].driven[4], runs[1].driven[9]
-    slow = replace(slow, result=replace(slow.result, infractions=()))
+    monkeypatch.setattr(page_module, "MAX_STILLS", 1)
+    slow, breaker = runs[1].results[4], runs[1].results[9]
+    slow = replace(slow, episode=replace(slow.episode, infractions=()))
     for one, width in ((slow, 40), (breaker, 41)):
         picture = simplejpeg.encode_jpeg(np.full((20, width, 3), width, np.uint8))
         (runs[1].folder / "stills" / f"{one.trial.key}-0.jpg").write_bytes(picture)
-    html = report_page([replace(runs[1], driven=(slow, breaker))])
+    html = report_page([replace(runs[1], results=(slow, breaker))])
     (shown,) = re.findall(r"data:image/jpeg;base64,([^\"]+)", html)
     (runs[1].folder / "stills" / f"{breaker.trial.key}-0.jpg").unlink()
     assert simplejpeg.decode_jpeg(base64.b64decode(shown)).shape == (20, 41, 3)
@@ -249,7 +259,7 @@ def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[Benchmark
     expected = [
         one
         for one in failures(runs[1:])
-        if any(i.kind is InfractionKind.SIDEWALK for i in one.episode.result.infractions)
+        if any(i.kind is InfractionKind.SIDEWALK for i in one.result.episode.infractions)
     ]
     assert shown.count() == len(expected) > 0
     assert page.locator("#shown").inner_text() == str(len(expected))

@@ -10,7 +10,6 @@ import pytest
 
 from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved
-from caldrive.visualization.contact_sheet import contact_sheet
 from caldrive.world.rendering.camera import CameraRig, Shot
 from caldrive.world.rendering.lens import Lens, mounted
 from caldrive.world.roads.network import RoadNetwork
@@ -216,14 +215,6 @@ def test_layers_stand_in_the_order_of_their_names() -> None:
     assert layers.shape[0] == len(Tex)
     red = layers[Tex.SIGN_60].astype(int)
     assert red[2, 2, 0] > red[2, 2, 1] + 100  # the sign's corner is as red as its ring
-
-
-def test_the_contact_sheet_shows_what_is_asked_for() -> None:
-    sheet = contact_sheet("town02", (64, 32), (1, 13))
-    assert sheet.shape == (6 + 2 * (32 + 24), 6 + 3 * 70, 3)
-    looks = contact_sheet("town01", (64, 32), (1,), randomised=2)
-    first, second = looks[6 + 18 : 6 + 50].astype(int), looks[6 + 56 + 18 : 6 + 56 + 50]
-    assert np.abs(first - second).mean() > 5
 
 
 def test_a_pixel_is_the_mean_of_what_lies_in_it(camera: CameraRig, approach: VehicleState) -> None:

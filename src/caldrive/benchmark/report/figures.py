@@ -1,4 +1,4 @@
-"""The report's pictures, as SVG: success beside the paper's, where infractions happened, errors over time, speed over
+"""The report's figures, as SVG: success beside the paper's, where infractions happened, errors over time, speed over
 distance."""
 
 from __future__ import annotations
@@ -13,22 +13,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from caldrive.benchmark.evidence import read_trace
+from caldrive.affordances import CONTINUOUS
+from caldrive.benchmark.artifacts import read_trace
 from caldrive.benchmark.metrics import cells
 from caldrive.benchmark.published import SYSTEMS, success
 from caldrive.benchmark.report.runs import BenchmarkRun
 from caldrive.datatypes import KMH
-from caldrive.results import InfractionKind
+from caldrive.results import Infraction, InfractionKind
 from caldrive.world.roads.towns import load_roads
 
-COLORS = ("#1f4e79", "#c8782d", "#4f8a4c", "#8a4c86", "#777777")
-
-MARKS = dict(zip(SYSTEMS, "xv^D", strict=True))
-
+RUN_COLORS = ("#1f4e79", "#c8782d", "#4f8a4c", "#8a4c86", "#777777")
+RUN_MARKERS = "os^Dv"
+SYSTEM_MARKERS = dict(zip(SYSTEMS, "xv^D", strict=True))
 KIND_COLORS = dict(zip(InfractionKind, ("#e0a100", "#8a4c86", "#d9534f", "#444444", "#1f77b4", "#e377c2"), strict=True))
-
-BIN, SLOTS = 5.0, 240  # s, and how many
-SHOWN = ("relative_angle", "center_distance", "vehicle_distance")
+BIN, BINS = 5.0, 240  # s of a bin of time, and how many there are; the last one takes what is later
+MIN_STEPS = 50  # in a bin, from which its mean is drawn
 
 
 def svg(figure: Figure) -> str:
@@ -41,27 +40,41 @@ def svg(figure: Figure) -> str:
 
 
 def success_figure(runs: Sequence[BenchmarkRun]) -> str:
-    """Success in each cell with its interval, and the paper's systems as marks."""
+    """Success in each cell with its interval, and the paper's systems as markers."""
     figure = Figure(figsize=(12, 4.2), layout="constrained")
     ax = figure.subplots()
-    found = {(run.name, c.condition, c.task): c for run in runs for c in cells(run.driven)}
-    places = list(dict.fromkeys(key[1:] for key in found))
+    by_place = {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.results)}
+    places = list(dict.fromkeys(key[1:] for key in by_place))
     width = 0.8 / len(runs)
     for k, run in enumerate(runs):
-        at = [(i + (k - (len(runs) - 1) / 2) * width, found.get((run.name, *p))) for i, p in enumerate(places)]
-        here = [(x, cell) for x, cell in at if cell is not None]
-        x, y = [x for x, _ in here], [cell.percent for _, cell in here]
-        spread = [[abs(c.percent - c.interval[side]) for _, c in here] for side in (0, 1)]
-        ax.bar(x, y, width * 0.92, color=COLORS[k % len(COLORS)], label=run.name, yerr=spread, ecolor="#222222")
-    for system, mark in MARKS.items():
-        known = [(i, success(system, *p)) for i, p in enumerate(places)]
-        known = [(i, v) for i, v in known if v is not None]
-        if known:
-            ax.plot(*zip(*known, strict=True), mark, color="black", ms=6, mfc="white", label=f"{system} (paper)", ls="")
+        left = (k - (len(runs) - 1) / 2) * width
+        cells_at = [(i + left, by_place.get((run.name, *place))) for i, place in enumerate(places)]
+        bars = [(x, cell) for x, cell in cells_at if cell is not None]
+        percents = [cell.percent for _, cell in bars]
+        error_bars = [[abs(cell.percent - cell.interval[side]) for _, cell in bars] for side in (0, 1)]
+        ax.bar(
+            [x for x, _ in bars], percents, width * 0.92, color=_run_color(k), label=run.name, yerr=error_bars,
+            ecolor="#222222",
+        )  # fmt: skip
+    _mark_published(ax, places)
     ax.set_xticks(range(len(places)), [f"{task}\n{condition}" for condition, task in places], fontsize=6, rotation=45)
     ax.set(ylabel="% reached in time", ylim=(0, 105))
     figure.legend(loc="outside right upper", fontsize=8)
     return svg(figure)
+
+
+def _mark_published(ax: Axes, places: Sequence[tuple[str, ...]]) -> None:
+    """What the paper's systems reached, at the cells' numbers."""
+    for system, marker in SYSTEM_MARKERS.items():
+        percents = ((i, success(system, *place)) for i, place in enumerate(places))
+        points = [(i, percent) for i, percent in percents if percent is not None]
+        if points:
+            label = f"{system} (paper)"
+            ax.plot(*zip(*points, strict=True), marker, color="black", ms=6, mfc="white", label=label, ls="")
+
+
+def _run_color(k: int) -> str:
+    return RUN_COLORS[k % len(RUN_COLORS)]
 
 
 def map_figure(runs: Sequence[BenchmarkRun], town: str) -> str:
@@ -70,23 +83,26 @@ def map_figure(runs: Sequence[BenchmarkRun], town: str) -> str:
     ax = figure.subplots()
     for lane in load_roads(town).lanes.values():
         ax.plot(*lane.line.points.T, color="#cccccc", lw=1.5, zorder=1)
-    marks = "os^Dv"
-    seen = set()
+    labels = set()
     for k, run in enumerate(runs):
-        for one in run.driven:
-            for i in one.result.infractions if one.trial.scenario.town == town else ():
-                name = f"{run.name}: {i.kind.value}"
-                face = KIND_COLORS[i.kind] if i.at_fault else "none"
-                label = None if name in seen else name
-                seen.add(name)
-                ax.scatter(
-                    i.x, i.y, 26, facecolors=face, edgecolors=KIND_COLORS[i.kind], marker=marks[k % 5],
-                    label=label, zorder=2,
-                )  # fmt: skip
+        for infraction in _infractions_in(run, town):
+            label = f"{run.name}: {infraction.kind.value}"
+            color = KIND_COLORS[infraction.kind]
+            ax.scatter(
+                infraction.x, infraction.y, 26, facecolors=color if infraction.at_fault else "none", edgecolors=color,
+                marker=RUN_MARKERS[k % len(RUN_MARKERS)], label=None if label in labels else label, zorder=2,
+            )  # fmt: skip
+            labels.add(label)
     ax.set(aspect="equal", title=town, xlabel="m", ylabel="m")
-    if seen:
+    if labels:
         figure.legend(loc="outside right upper", fontsize=7)
     return svg(figure)
+
+
+def _infractions_in(run: BenchmarkRun, town: str) -> Iterator[Infraction]:
+    for result in run.results:
+        if result.trial.scenario.town == town:
+            yield from result.episode.infractions
 
 
 def _legend(ax: Axes) -> None:
@@ -94,37 +110,46 @@ def _legend(ax: Axes) -> None:
         ax.legend(fontsize=8)
 
 
-def traces(run: BenchmarkRun) -> Iterator[dict[str, list[Any]]]:
+def _traces(run: BenchmarkRun) -> Iterator[dict[str, list[Any]]]:
     """The columns of all episodes whose traces lie in a run's folder."""
-    for one in run.driven:
-        columns = read_trace(run.folder, one.trial.key)
+    for result in run.results:
+        columns = read_trace(run.folder, result.trial.key)
         if columns is not None:
             yield columns
 
 
-def _error_sums(columns: dict[str, list[Any]], name: str) -> NDArray[np.float64]:
-    """How often a continuous affordance was seen in each slot of time, and the sum of what it was off by (2, SLOTS)."""
-    seen, true = (np.array(columns[f"{kind}_{name}"], dtype=float) for kind in ("predicted", "true"))
-    slot = np.minimum(np.array(columns["time"]) // BIN, SLOTS - 1).astype(int)
-    known = np.isfinite(seen)  # a blind car sees nothing
-    wrong = np.abs(seen - true)[known]
-    return np.stack([np.bincount(slot[known], weight, SLOTS) for weight in (np.ones_like(wrong), wrong)])
+def error_sums(columns: dict[str, list[Any]], name: str) -> NDArray[np.float64]:
+    """How often a continuous affordance was known in each bin of time, and the sum of its errors (2, BINS)."""
+    predicted, true = (np.array(columns[f"{kind}_{name}"], dtype=float) for kind in ("predicted", "true"))
+    bins = np.minimum(np.array(columns["time"]) // BIN, BINS - 1).astype(int)
+    known = np.isfinite(predicted)  # a blind car sees nothing
+    errors = np.abs(predicted - true)[known]
+    return np.stack([np.bincount(bins[known], weight, BINS) for weight in (np.ones_like(errors), errors)])
+
+
+def _run_error_sums(run: BenchmarkRun) -> NDArray[np.float64]:
+    """`error_sums` over a run's traces, of each of CONTINUOUS (3, 2, BINS)."""
+    sums = np.zeros((len(CONTINUOUS), 2, BINS))
+    for columns in _traces(run):
+        sums += [error_sums(columns, spec.name) for spec in CONTINUOUS]
+    return sums
 
 
 def errors_figure(runs: Sequence[BenchmarkRun]) -> str:
-    """Mean absolute error of the continuous affordances over the time since the start."""
+    """Mean absolute error of the continuous affordances over the time since the start; empty where no agent gives
+    any."""
+    sums = [_run_error_sums(run) for run in runs]
+    if not any(run_sums[:, 0].any() for run_sums in sums):
+        return ""
     figure = Figure(figsize=(12, 3.2), layout="constrained")
-    axes = figure.subplots(1, len(SHOWN))
-    for k, run in enumerate(runs):
-        sums = np.zeros((len(SHOWN), 2, SLOTS))
-        for columns in traces(run):
-            sums += [_error_sums(columns, name) for name in SHOWN]
-        for ax, name, (count, wrong) in zip(axes, SHOWN, sums, strict=True):
-            enough = count > 50
-            at = (np.arange(SLOTS) * BIN)[enough]
-            ax.plot(at, wrong[enough] / count[enough], color=COLORS[k % len(COLORS)], label=run.name)
-            ax.set(title=name.replace("_", " "), xlabel="s since the start")
-    for ax in axes:
+    axes = figure.subplots(1, len(CONTINUOUS))
+    for k, (run, run_sums) in enumerate(zip(runs, sums, strict=True)):
+        for ax, (count, total) in zip(axes, run_sums, strict=True):
+            enough = count > MIN_STEPS
+            times = (np.arange(BINS) * BIN)[enough]
+            ax.plot(times, total[enough] / count[enough], color=_run_color(k), label=run.name)
+    for ax, spec in zip(axes, CONTINUOUS, strict=True):
+        ax.set(title=spec.title, xlabel="s since the start", ylabel=spec.unit)
         ax.set_ylim(bottom=0)
     _legend(axes[0])
     return svg(figure)
@@ -132,19 +157,19 @@ def errors_figure(runs: Sequence[BenchmarkRun]) -> str:
 
 def speed_figure(runs: Sequence[BenchmarkRun]) -> str:
     """Speed over distance in the longest episode that all agents drove."""
-    keys = set.intersection(*({one.trial.key for one in run.driven} for run in runs))
-    longest = max(
-        (one for one in runs[0].driven if one.trial.key in keys), key=lambda one: one.result.route_length, default=None
-    )
+    keys = set.intersection(*({result.trial.key for result in run.results} for run in runs))
+    shared = [result for result in runs[0].results if result.trial.key in keys]
+    longest = max(shared, key=lambda result: result.episode.route_length, default=None)
     figure = Figure(figsize=(12, 3.2), layout="constrained")
     ax = figure.subplots()
     for k, run in enumerate(runs):
         columns = read_trace(run.folder, longest.trial.key) if longest else None
         if columns is None:
             continue
-        ax.plot(columns["route_done"], np.array(columns["speed"]) / KMH, color=COLORS[k % len(COLORS)], label=run.name)
+        done, speed = columns["route_done"], np.array(columns["speed"]) / KMH
+        ax.plot(done, speed, color=_run_color(k), label=run.name)
         if k == 0:
-            ax.step(columns["route_done"], columns["road_limit"], "k--", lw=1, where="post", label="limit on the signs")
+            ax.step(done, columns["road_limit"], "k--", lw=1, where="post", label="limit on the signs")
     ax.set(title=longest.trial.key if longest else "", xlabel="m along the route", ylabel="km/h", ylim=(0, None))
     _legend(ax)
     return svg(figure)

@@ -2,70 +2,100 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from caldrive.benchmark.evidence import read_trace
-from caldrive.benchmark.failure_causes import Cause, cause
+from caldrive.affordances import CONTINUOUS, DISCRETE
+from caldrive.benchmark.artifacts import read_trace
+from caldrive.benchmark.failure_causes import FailureCause, failure_cause
+from caldrive.benchmark.metrics import succeeded
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.benchmark.settings import BenchmarkSettings
-from caldrive.benchmark.suites import Driven
+from caldrive.benchmark.suites import TrialResult
 from caldrive.plugins import short_name
 from caldrive.results import Outcome
 
-UNITS = {"vehicle_distance": "m", "relative_angle": "rad", "center_distance": "m"}
+LARGE_ERRORS = {  # before an infraction, from which an affordance is named: share of steps, or SI units
+    "hazard_stop": 0.2, "red_light": 0.2, "speed_sign": 0.2, "vehicle_distance": 3.0, "relative_angle": 0.1,
+    "center_distance": 0.3,
+}  # fmt: skip
+OPTIONS = {"--controller": "controller", "--time-limit": "time_limit", "--seed": "seed"}  # of a command, if not usual
 
 
 @dataclass(frozen=True)
 class BenchmarkRun:
-    """One folder: its name in the report, its description, and its episodes."""
+    """One run's folder."""
 
     name: str
+    """Its name in the report, which no other run has."""
     folder: Path
-    about: dict[str, Any]
-    driven: tuple[Driven, ...]
+    """Where it lies."""
+    description: dict[str, Any]
+    """What its run.json says, a `RunDescription`."""
+    results: tuple[TrialResult, ...]
+    """Its episodes, in the suite's order."""
 
-    def only(self, condition: str) -> list[Driven]:
+    def of_condition(self, condition: str) -> list[TrialResult]:
         """The episodes of one condition."""
-        return [one for one in self.driven if one.trial.condition == condition]
+        return [result for result in self.results if result.trial.condition == condition]
 
     @cached_property
     def failures(self) -> tuple[Failure, ...]:
         """The episodes that missed their goal or broke a rule, in the suite's order."""
-        missed = (Outcome.TIMEOUT, Outcome.ABORTED)  # where an infraction ended the episode, it is the cause
         return tuple(
-            Failure(
-                self.name, one, tuple(_before(one, k) for k in range(len(one.result.infractions))),
-                _cause(self.folder, one) if one.result.outcome in missed else None,
-            )
-            for one in self.driven
-            if one.result.outcome is not Outcome.SUCCESS or any(i.at_fault for i in one.result.infractions)
-        )  # fmt: skip
+            self._failure(result)
+            for result in self.results
+            if not succeeded(result) or any(infraction.at_fault for infraction in result.episode.infractions)
+        )
+
+    def _failure(self, result: TrialResult) -> Failure:
+        errors = tuple(_errors_before(result, k) for k in range(len(result.episode.infractions)))
+        # Where an infraction ended the episode, it is the cause.
+        missed = result.episode.outcome in (Outcome.TIMEOUT, Outcome.ABORTED)
+        trace = read_trace(self.folder, result.trial.key) if missed else None
+        cause = failure_cause(trace) if trace else None
+        return Failure(run=self.name, result=result, errors_before=errors, cause=cause)
 
     @property
     def command(self) -> str:
         """What to type for these results."""
-        about, usual = self.about, BenchmarkSettings()
-        words = [f"caldrive benchmark --suite {about['suite']} --agent {about['agent']}"]
-        words.append("--signs" if about["cap"] is None else f"--cap {about['cap']:g}")
-        given = {"--controller": "controller", "--time-limit": "time_limit", "--seed": "seed"}
-        words += [f"{word} {about[name]}" for word, name in given.items() if about[name] != getattr(usual, name)]
-        words += [f"--model {about['model_file']}"] if about.get("model_file") else []
-        return " ".join([*words, "--out DIR"])
+        about, usual = self.description, BenchmarkSettings()
+        words = ["caldrive", "benchmark", "--suite", about["suite"], "--agent", about["agent"]]
+        words += ["--signs"] if about["cap"] is None else ["--cap", f"{about['cap']:g}"]
+        for option, name in OPTIONS.items():
+            words += [option, str(about[name])] if about[name] != getattr(usual, name) else []
+        words += ["--model", about["model_file"]] if about.get("model_file") else []
+        return shlex.join([*words, "--out", "DIR"])
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An episode that missed its goal or broke a rule."""
+
+    run: str
+    """The run's name."""
+    result: TrialResult
+    """What was driven, and how it went."""
+    errors_before: tuple[str, ...]
+    """For each infraction, which affordances were wrong in the seconds before it, in words."""
+    cause: FailureCause | None = None
+    """How a missed goal began, where that is known."""
 
 
 def load_run(path: Path) -> BenchmarkRun:
-    """Reads a benchmark's folder. Raises ValueError where there is none, or nothing in it."""
+    """Reads a run's folder. Raises ValueError where there is none, or nothing in it."""
     folder = RunFolder(path)
-    driven = folder.driven()
-    if not driven:
+    results = folder.results()
+    if not results:
         raise ValueError(f"found no episode in {path}, wanted some: type caldrive benchmark --out {path}")
-    if not all("turning" in one.result.comfort and "reds_obeyed" in one.figures for one in driven):
+    if not all("turning" in result.episode.comfort and "reds_obeyed" in result.metrics for result in results):
         raise ValueError(f"found results of an older caldrive in {path}: type caldrive benchmark --out ANOTHER")
-    return BenchmarkRun(short_name(folder.about["agent"]), path, folder.about, tuple(driven))
+    name = short_name(folder.description["agent"])
+    return BenchmarkRun(name=name, folder=path, description=folder.description, results=tuple(results))
 
 
 def load_runs(folders: Sequence[Path]) -> list[BenchmarkRun]:
@@ -75,49 +105,38 @@ def load_runs(folders: Sequence[Path]) -> list[BenchmarkRun]:
     runs = [load_run(folder) for folder in folders]
     names = [run.name for run in runs]
     return [
-        replace(run, name=f"{run.name} ({_apart(run.folder, folders)})") if names.count(run.name) > 1 else run
+        replace(run, name=f"{run.name} ({_unique_end(run.folder, folders)})") if names.count(run.name) > 1 else run
         for run in runs
     ]
 
 
-def _apart(folder: Path, folders: Sequence[Path]) -> str:
+def _unique_end(folder: Path, folders: Sequence[Path]) -> str:
     """As much of a folder's path, from its end, as no other has."""
-    ends = [other.resolve().parts for other in folders if other.resolve() != folder.resolve()]
-    own = folder.resolve().parts
-    length = next(n for n in range(1, len(own) + 1) if all(end[-n:] != own[-n:] for end in ends))
-    return "/".join(own[-length:])
+    others = [other.resolve().parts for other in folders if other.resolve() != folder.resolve()]
+    parts = folder.resolve().parts
+    length = next(n for n in range(1, len(parts) + 1) if all(other[-n:] != parts[-n:] for other in others))
+    return "/".join(parts[-length:])
 
 
 def conditions(runs: Sequence[BenchmarkRun]) -> list[str]:
     """All conditions in the order in which they first appear."""
-    return list(dict.fromkeys(one.trial.condition for run in runs for one in run.driven))
-
-
-@dataclass(frozen=True)
-class Failure:
-    """An episode that missed its goal or broke a rule. before: for each infraction what was wrong in the seconds
-    before it; cause: how a missed goal began, where that is known."""
-
-    run: str
-    episode: Driven
-    before: tuple[str, ...]
-    cause: Cause | None = None
+    return list(dict.fromkeys(result.trial.condition for run in runs for result in run.results))
 
 
 def failures(runs: Sequence[BenchmarkRun]) -> list[Failure]:
     """Those of all runs."""
-    return [one for run in runs for one in run.failures]
+    return [failure for run in runs for failure in run.failures]
 
 
-def _cause(folder: Path, one: Driven) -> Cause | None:
-    trace = read_trace(folder, one.trial.key)
-    return cause(trace) if trace else None
-
-
-def _before(one: Driven, k: int) -> str:
-    """The affordances that were off in the seconds before infraction k."""
-    found = {n.split("/")[2]: v for n, v in one.figures.items() if n.startswith(f"before/{k}/") and v is not None}
-    limits = {"vehicle_distance": 3.0, "relative_angle": 0.1, "center_distance": 0.3}
-    wrong = [f"{n.replace('_', ' ')} {v:.2f} {UNITS[n]}" for n, v in found.items() if n in UNITS and v > limits[n]]
-    wrong += [f"{n.replace('_', ' ')} {100 * v:.0f} %" for n, v in found.items() if n not in UNITS and v > 0.2]
+def _errors_before(result: TrialResult, k: int) -> str:
+    """The affordances that were wrong in the seconds before infraction k, in words."""
+    means = {spec: result.metrics.get(f"before/{k}/{spec.name}") for spec in (*CONTINUOUS, *DISCRETE)}
+    known = {spec: mean for spec, mean in means.items() if mean is not None}
+    if not known:
+        return "not known"
+    wrong = (
+        f"{spec.title} {100 * mean:.0f} %" if spec.discrete else f"{spec.title} {mean:.2f} {spec.unit}"
+        for spec, mean in known.items()
+        if mean > LARGE_ERRORS[spec.name]
+    )
     return ", ".join(wrong) or "nothing"

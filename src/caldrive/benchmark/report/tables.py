@@ -1,4 +1,4 @@
-"""The report's tables as rows of text: every figure of the paper's tables beside ours."""
+"""The report's tables as rows of text: every number of the paper's tables beside ours."""
 
 from __future__ import annotations
 
@@ -6,146 +6,165 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from caldrive.affordances import BY_NAME, AffordanceSpec
 from caldrive.benchmark.failure_causes import common_places
-from caldrive.benchmark.metrics import cells, comfort, errors, rates, reds
+from caldrive.benchmark.metrics import Cell, cells, infraction_rates, mean_comfort, mean_errors, red_light_counts
 from caldrive.benchmark.published import COMFORT, SYSTEMS, km_between, success
-from caldrive.benchmark.report.runs import UNITS, BenchmarkRun, conditions, failures
-from caldrive.benchmark.suites import Driven
+from caldrive.benchmark.report.runs import BenchmarkRun, conditions
+from caldrive.benchmark.suites import TrialResult
 
 DYNAMIC, ALL = "navigation-dynamic", "all"  # tasks whose infractions are counted together
+COMFORT_HEADS = {
+    "center_distance": "centre distance, median m", "jerk": "jerk m/s³", "lateral_straight": "lateral, straight",
+    "lateral_turn": "lateral, turns", "comfortable": "in nuPlan's bounds %",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the report: title, a sentence on it, heads of the columns, and rows of text."""
+    """A table of the report."""
 
     title: str
     text: str
+    """A sentence on it."""
     head: tuple[str, ...]
+    """The names of its columns."""
     rows: tuple[tuple[str, ...], ...]
+    """Each as long as the head."""
 
 
 def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
-    """All tables of the report."""
-    return [
-        _about(runs), _success(runs), _infractions(runs), _lights(runs), _comfort(runs), _errors(runs), _causes(runs)
+    """All tables of the report: the runs, their success, and of the others those that are not empty."""
+    others = [
+        _infractions(runs), _red_lights(runs), _comfort(runs), _affordance_errors(runs), _failure_causes(runs)
     ]  # fmt: skip
+    return [_runs(runs), _success(runs), *(table for table in others if table.rows)]
 
 
-def _about(runs: Sequence[BenchmarkRun]) -> Table:
+def _runs(runs: Sequence[BenchmarkRun]) -> Table:
     rows = [
         (
-            run.name, run.about["suite"], str(len(run.driven)), str(run.about["model"] or ""), run.about["code"],
-            run.about["began"][:16].replace("T", " "), run.about["machine"], run.command,
+            run.name, run.description["suite"], str(len(run.results)), str(run.description["model"] or ""),
+            run.description["code"], run.description["began"][:16].replace("T", " "), run.description["machine"],
+            run.command,
         )
         for run in runs
     ]  # fmt: skip
     head = ("agent", "suite", "episodes", "model", "code", "began (UTC)", "machine", "command")
-    return Table("Runs", "What drove, and what to type to see it again.", head, tuple(rows))
+    return Table(title="Runs", text="What drove, and what to type to see it again.", head=head, rows=tuple(rows))
 
 
 def _success(runs: Sequence[BenchmarkRun]) -> Table:
-    found = {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.driven)}
+    by_place = {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.results)}
     rows = []
-    for condition, task in dict.fromkeys(key[1:] for key in found):
-        row = [condition, task]
-        for run in runs:
-            cell = found.get((run.name, condition, task))
-            low, high = cell.interval if cell else (0, 0)
-            row.append(
-                f"{cell.percent:.0f} ({low:.0f}-{high:.0f}, {cell.successes} of {cell.episodes})" if cell else ""
-            )
-            row.append(f"{100 * cell.clean / cell.episodes:.0f}" if cell else "")
-            row.append(f"{100 * cell.completion:.0f}" if cell else "")
-            row.append(f"{cell.score:.0f}" if cell else "")
+    for condition, task in dict.fromkeys(key[1:] for key in by_place):
+        ours = [value for run in runs for value in _cell_texts(by_place.get((run.name, condition, task)))]
         published = [success(system, condition, task) for system in SYSTEMS]
-        rows.append((*row, *("" if value is None else str(value) for value in published)))
-    ours = [
-        head
-        for run in runs
-        for head in (f"{run.name} %", f"{run.name} clean %", f"{run.name} route %", f"{run.name} score")
-    ]
+        rows.append((condition, task, *ours, *("" if value is None else str(value) for value in published)))
+    heads = [f"{run.name} {what}" for run in runs for what in ("%", "clean %", "route %", "score")]
     text = (
         "Percent of the episodes that reached their goal in time, with Wilson's 95 % interval; percent that did so "
         "clean, without an infraction of their own fault; share of the routes covered; driving score of Leaderboard "
         "2.1. The paper's systems drove in CARLA."
     )
-    head = ("condition", "task", *ours, *(f"{system} (paper)" for system in SYSTEMS))
-    return Table("Success", text, head, tuple(rows))
+    head = ("condition", "task", *heads, *_published_heads())
+    return Table(title="Success", text=text, head=head, rows=tuple(rows))
+
+
+def _cell_texts(cell: Cell | None) -> tuple[str, str, str, str]:
+    """Success, clean, route and score of a cell; empty where a run has not driven it."""
+    if cell is None:
+        return "", "", "", ""
+    low, high = cell.interval
+    return (
+        f"{cell.percent:.0f} ({low:.0f}-{high:.0f}, {cell.successes} of {cell.episodes})",
+        f"{100 * cell.clean / cell.episodes:.0f}",
+        f"{100 * cell.completion:.0f}",
+        f"{cell.score:.0f}",
+    )
+
+
+def _published_heads() -> tuple[str, ...]:
+    return tuple(f"{system} (paper)" for system in SYSTEMS)
 
 
 def _infractions(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for condition in conditions(runs):
         for tasks in (DYNAMIC, ALL):
-            found = [rates([one for one in run.only(condition) if _among(one, tasks)]) for run in runs]
-            for column in zip(*found, strict=True) if any(rate[0].km for rate in found) else ():
-                kind = column[0].kind
+            rates = [infraction_rates(_of_tasks(run.of_condition(condition), tasks)) for run in runs]
+            if not any(rates_of_run[0].km for rates_of_run in rates):
+                continue
+            for rates_of_kind in zip(*rates, strict=True):
+                kind = rates_of_kind[0].kind
                 published = [km_between(system, condition, kind) if tasks == DYNAMIC else "" for system in SYSTEMS]
-                ours = (f"{rate.km_between} ({rate.count})" for rate in column)
+                ours = (f"{rate.km_between} ({rate.count})" for rate in rates_of_kind)
                 rows.append((condition, tasks, kind.value, *ours, *published))
     text = (
         "Kilometres between two infractions and how many there were; > where there was none in so many kilometres. "
-        "The benchmark counts infractions in navigation among others, where the paper's figures stand."
+        "The paper counts infractions in the task navigation-dynamic only."
     )
-    systems = (f"{system} (paper)" for system in SYSTEMS)
-    return Table(
-        "Infractions", text, ("condition", "tasks", "infraction", *(run.name for run in runs), *systems), tuple(rows)
-    )
+    head = ("condition", "tasks", "infraction", *(run.name for run in runs), *_published_heads())
+    return Table(title="Infractions", text=text, head=head, rows=tuple(rows))
 
 
-def _among(one: Driven, tasks: str) -> bool:
-    return tasks == ALL or one.trial.scenario.task == tasks
+def _of_tasks(results: Sequence[TrialResult], tasks: str) -> list[TrialResult]:
+    return [result for result in results if tasks in (ALL, result.trial.scenario.task)]
 
 
-def _lights(runs: Sequence[BenchmarkRun]) -> Table:
+def _red_lights(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for condition in conditions(runs):
         for run in runs:
-            met, broken = reds(run.only(condition))
-            share = f"{100 * (met - broken) / met:.1f}" if met else ""
-            rows.append((condition, run.name, str(met), str(met - broken), share))
+            met, ran = red_light_counts(run.of_condition(condition))
+            share = f"{100 * (met - ran) / met:.1f}" if met else ""
+            rows.append((condition, run.name, str(met), str(met - ran), share))
     text = "Red lights that an agent stopped for or ran; those that turned green before it stood do not count."
-    return Table("Red lights", text, ("condition", "agent", "met", "obeyed", "%"), tuple(rows))
+    return Table(title="Red lights", text=text, head=("condition", "agent", "met", "obeyed", "%"), rows=tuple(rows))
 
 
 def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
-    names = {
-        "center_distance": "centre distance, median m", "jerk": "jerk m/s³", "lateral_straight": "lateral, straight",
-        "lateral_turn": "lateral, turns", "comfortable": "in nuPlan's bounds %",
-    }  # fmt: skip
     rows = []
     for run in runs:
         for condition in ("all", *conditions([run])):
-            found = comfort(run.driven if condition == "all" else run.only(condition))
-            values = [f"{100 * v:.1f}" if k == "comfortable" else f"{v:.3f}" for k, v in found.items()]
+            means = mean_comfort(run.results if condition == "all" else run.of_condition(condition))
+            values = (f"{100 * v:.1f}" if name == "comfortable" else f"{v:.3f}" for name, v in means.items())
             rows.append((run.name, condition, *values))
-    rows.append(("CAL (paper)", "training", *(f"{COMFORT[name]:.3f}" for name in list(names)[:4]), ""))
+    published = (f"{COMFORT[name]:.3f}" if name in COMFORT else "" for name in COMFORT_HEADS)
+    rows.append(("CAL (paper)", "training", *published))
     text = "Median distance to the centre line and RMS jerk (supplement 3.2), and the share of time in comfort."
-    return Table("Driving behaviour", text, ("agent", "condition", *names.values()), tuple(rows))
+    head = ("agent", "condition", *COMFORT_HEADS.values())
+    return Table(title="Driving behaviour", text=text, head=head, rows=tuple(rows))
 
 
-def _errors(runs: Sequence[BenchmarkRun]) -> Table:
-    rows: list[tuple[str, ...]] = []
-    heads: tuple[str, ...] = ()
-    for run in runs:
-        for condition in conditions([run]):
-            found = errors(run.only(condition))
-            heads = tuple(f"{n.replace('_', ' ')} {UNITS.get(n, '% wrong')}" for n in found) or heads
-            rows.append((
-                run.name, condition, *(f"{v:.3f}" if k in UNITS else f"{100 * v:.2f}" for k, v in found.items())
-            ))  # fmt: skip
-    text = "What the affordances were off by while driving: share of wrong frames, or mean absolute error."
-    return Table("Affordances while driving", text, ("agent", "condition", *heads), tuple(rows))
+def _affordance_errors(runs: Sequence[BenchmarkRun]) -> Table:
+    errors = {(run.name, name): mean_errors(run.of_condition(name)) for run in runs for name in conditions([run])}
+    specs = [BY_NAME[name] for name in dict.fromkeys(name for values in errors.values() for name in values)]
+    rows = [
+        (*place, *(_error_text(spec, values.get(spec.name)) for spec in specs))
+        for place, values in errors.items()
+        if values  # an agent may give no affordances
+    ]
+    heads = (f"{spec.title} {'% wrong' if spec.discrete else spec.unit}" for spec in specs)
+    text = "How far the affordances were off while driving: share of wrong steps, or mean absolute error."
+    head = ("agent", "condition", *heads)
+    return Table(title="Affordances while driving", text=text, head=head, rows=tuple(rows))
 
 
-def _causes(runs: Sequence[BenchmarkRun]) -> Table:
+def _error_text(spec: AffordanceSpec, error: float | None) -> str:
+    if error is None:
+        return ""
+    return f"{100 * error:.2f}" if spec.discrete else f"{error:.3f}"
+
+
+def _failure_causes(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
-    found = failures(runs)
     for run in runs:
-        for town in dict.fromkeys(one.trial.scenario.town for one in run.driven):
-            causes = [f.cause for f in found if f.run == run.name and f.episode.trial.scenario.town == town and f.cause]
-            for (what, x, y, command), count in common_places(causes):
-                rows.append((run.name, Path(town).stem, what, f"({x}, {y})", command, str(count)))
+        for town in dict.fromkeys(result.trial.scenario.town for result in run.results):
+            here = [failure for failure in run.failures if failure.result.trial.scenario.town == town]
+            causes = [failure.cause for failure in here if failure.cause is not None]
+            for (event, x, y, command), count in common_places(causes):
+                rows.append((run.name, Path(town).stem, event, f"({x}, {y})", command, str(count)))
     text = "What the car did wrong first in the episodes that missed their goal, and near which place."
-    return Table("How missed goals began", text, ("agent", "town", "what", "near", "command", "episodes"), tuple(rows))
+    head = ("agent", "town", "what", "near", "command", "episodes")
+    return Table(title="Failure causes", text=text, head=head, rows=tuple(rows))

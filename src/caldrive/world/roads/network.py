@@ -110,7 +110,7 @@ class RoadNetwork:
                 best = (abs(hit.left), lane, hit.s)
         if best is None or best[0] > 4.0:
             raise ValueError(
-                f"found no lane of {self.name} at ({pose.x:.1f}, {pose.y:.1f}) with heading {pose.heading:.2f} rad, "
+                f"found no lane of {self.name} at ({pose.x:.1f}, {pose.y:.1f}) with heading {_degrees(pose)}, "
                 f"wanted a place on a lane: the nearest is {self._nearest(pose.x, pose.y)}"
             )
         return best[1], best[2]
@@ -123,11 +123,16 @@ class RoadNetwork:
 
     def _nearest(self, x: float, y: float) -> str:
         lane, at = self._closest(x, y)
-        return f"{lane.id} at ({at.x:.1f}, {at.y:.1f}) with heading {at.heading:.2f} rad"
+        return f"{lane.id} at ({at.x:.1f}, {at.y:.1f}) with heading {_degrees(at)}"
 
     def nearest_heading(self, x: float, y: float) -> float:
         """The heading of the lane that runs nearest to a place, rad."""
         return self._closest(x, y)[1].heading
+
+
+def _degrees(pose: Pose) -> str:
+    """A heading as a person types it."""
+    return f"{math.degrees(pose.heading):.0f}°"
 
 
 def _allows_cars(lane: sumolib.net.lane.Lane) -> bool:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from caldrive.agents.cal import NOTHING
-from caldrive.benchmark.behaviour import Behaviour, reds_obeyed
+from caldrive.agents.cal import UNKNOWN
+from caldrive.benchmark.episode_metrics import EpisodeMetrics, red_lights_obeyed
 from caldrive.control.longitudinal import DriveState
 from caldrive.datatypes import Affordances, Control, Decision, Observation, Pose, Step, Truth, VehicleState
 from caldrive.files import json_line
@@ -24,32 +24,32 @@ def step(time: float, seen: Affordances, true: Affordances, opposite: float = 0.
 
 
 def test_errors_are_means_over_the_episode_and_over_the_seconds_before_an_infraction() -> None:
-    true, behaviour = Affordances(), Behaviour()
+    true, episode = Affordances(), EpisodeMetrics()
     for k in range(100):
         wrong = replace(true, relative_angle=0.3, hazard_stop=0.9) if k >= 75 else true
-        behaviour.add(step(k / 10, wrong, true))
-    figures = behaviour.figures([Infraction(InfractionKind.SIDEWALK, 9.9, 0, 0)])
-    assert figures["error/relative_angle"] == pytest.approx(0.3 * 0.25)
-    assert figures["error/hazard_stop"] == pytest.approx(0.25)
-    assert figures["before/0/relative_angle"] == pytest.approx(0.3 * 25 / 30, abs=0.011)
-    assert figures["before/0/red_light"] == 0
+        episode.add(step(k / 10, wrong, true))
+    metrics = episode.metrics([Infraction(InfractionKind.SIDEWALK, 9.9, 0, 0)])
+    assert metrics["error/relative_angle"] == pytest.approx(0.3 * 0.25)
+    assert metrics["error/hazard_stop"] == pytest.approx(0.25)
+    assert metrics["before/0/relative_angle"] == pytest.approx(0.3 * 25 / 30, abs=0.011)
+    assert metrics["before/0/red_light"] == 0
 
 
 def test_time_off_the_lane_counts() -> None:
-    behaviour, true = Behaviour(), Affordances()
+    episode, true = EpisodeMetrics(), Affordances()
     for k in range(60):
-        behaviour.add(step(k / 10, true, true, opposite=0.5 if k < 15 else 0.1))
-    assert behaviour.figures([])["off_lane"] == pytest.approx(0.25)
+        episode.add(step(k / 10, true, true, opposite=0.5 if k < 15 else 0.1))
+    assert episode.metrics([])["off_lane"] == pytest.approx(0.25)
 
 
 def test_all_figures_are_jsons() -> None:
-    behaviour, red = Behaviour(), Affordances(red_light=1.0)
+    episode, red = EpisodeMetrics(), Affordances(red_light=1.0)
     for k in range(20):
         seen = step(k / 10, red, red)
-        behaviour.add(replace(seen, truth=replace(seen.truth, ego=VehicleState(Pose(0, 0, 0), 0.0))))
-    figures = behaviour.figures([Infraction(InfractionKind.SIDEWALK, 1.0, 0, 0)])
-    assert json.loads(json_line(figures)) == figures
-    assert figures["reds_obeyed"] == 1
+        episode.add(replace(seen, truth=replace(seen.truth, ego=VehicleState(Pose(0, 0, 0), 0.0))))
+    metrics = episode.metrics([Infraction(InfractionKind.SIDEWALK, 1.0, 0, 0)])
+    assert json.loads(json_line(metrics)) == metrics
+    assert metrics["reds_obeyed"] == 1
 
 
 APPROACH = [8.0, 6.0, 4.0, 2.0, 0.0, 0.0, 0.0, 0.0]  # m/s, to a stand
@@ -72,12 +72,12 @@ def test_a_red_light_is_obeyed_where_the_car_stood_before_it_and_did_not_run_it(
     red: list[int], speed: list[float], run: list[float], obeyed: int
 ) -> None:
     time = np.arange(len(red), dtype=np.float64) * 0.5
-    assert reds_obeyed(time, np.array(red, float), np.array(speed), run) == obeyed
+    assert red_lights_obeyed(time, np.array(red, float), np.array(speed), run) == obeyed
 
 
 def test_a_blind_frame_is_no_right_answer() -> None:
-    behaviour, true = Behaviour(), Affordances(hazard_stop=1.0)
+    episode, true = EpisodeMetrics(), Affordances(hazard_stop=1.0)
     for k in range(10):
-        behaviour.add(step(k / 10, NOTHING if k < 5 else replace(true, hazard_stop=0.0), true))
-    figures = behaviour.figures([])
-    assert (figures["error/hazard_stop"], figures["error/relative_angle"]) == (1.0, 0.0)
+        episode.add(step(k / 10, UNKNOWN if k < 5 else replace(true, hazard_stop=0.0), true))
+    metrics = episode.metrics([])
+    assert (metrics["error/hazard_stop"], metrics["error/relative_angle"]) == (1.0, 0.0)

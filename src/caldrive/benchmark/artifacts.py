@@ -1,4 +1,5 @@
-"""What the report shows of an episode: its trace, and a still of each infraction and of an end without goal."""
+"""What a benchmark keeps of an episode beside its line of results, for the report and the search for failures: its
+trace, and a still picture of each infraction and of an end without the goal."""
 
 from __future__ import annotations
 
@@ -19,36 +20,41 @@ from caldrive.interfaces import World, is_recordable
 from caldrive.results import EpisodeResult, Outcome
 
 STILL = replace(CameraConfig(), width=480, height=212)
-MOST = 4  # stills of one episode; more would show the same once more
-JPEG = {"quality": 75, "colorspace": "RGB", "colorsubsampling": "420"}  # to be looked at, not learnt from
+MAX_STILLS = 4  # of one episode; more would show the same again
+JPEG = {"quality": 75, "colorspace": "RGB", "colorsubsampling": "420"}  # to be looked at, not to train on
+REQUIRED = ("time", "x", "y", "speed", "route_done")  # columns of a trace that are always numbers
 
 
-class Evidence:
-    """Gathers it while an episode is driven. Where the world's cameras cannot be moved, the agent's image is kept."""
+class EpisodeArtifacts:
+    """Collects the artifacts while an episode is driven.
+
+    Where the world's cameras cannot be moved, the stills are the images that the agent sees.
+    """
 
     def __init__(self, world: World, referee: Referee) -> None:
         self.world, self.referee, self.trace, self.stills = world, referee, Trace(), list[Image]()
-        self._counted = 0  # infractions so far
+        self._infractions = 0  # so far
         self._image: Image | None = None
 
     def add(self, step: Step) -> None:
-        """One more step."""
+        """One more step, which the referee has seen."""
         self.trace.add(step)
         self._image = step.observation.image
-        if len(self.referee.infractions) > self._counted and len(self.stills) < MOST:
+        if len(self.referee.infractions) > self._infractions and len(self.stills) < MAX_STILLS:
             self.stills.append(self._still())
-        self._counted = len(self.referee.infractions)
+        self._infractions = len(self.referee.infractions)
 
     def _still(self) -> Image:
+        """What the car sees now (H, W, 3)."""
         if is_recordable(self.world):
             return self.world.images([STILL])[0]
         assert self._image is not None
         return np.ascontiguousarray(self._image)
 
     def files(self, key: str, result: EpisodeResult) -> dict[str, bytes]:
-        """Trace and stills by their names in a benchmark's folder."""
+        """Trace and stills by their names in a run's folder. key: the trial's."""
         stills = list(self.stills)
-        if result.outcome in (Outcome.TIMEOUT, Outcome.ABORTED) and len(stills) < MOST:
+        if result.outcome in (Outcome.TIMEOUT, Outcome.ABORTED) and len(stills) < MAX_STILLS:
             stills.append(self._still())
         trace = {str(trace_path(Path(), key)): gzip.compress(episode_json(result, self.trace), mtime=0)}
         pictures = (simplejpeg.encode_jpeg(still, **JPEG) for still in stills)
@@ -56,32 +62,37 @@ class Evidence:
 
 
 def trace_path(folder: Path, key: str) -> Path:
+    """Where a trial's trace lies in a run's folder."""
     return folder / "traces" / f"{key}.json.gz"
 
 
 def still_paths(folder: Path, key: str) -> list[Path]:
-    """The stills that an episode left, in the order of its infractions; the last one may be its end."""
+    """A trial's stills, in the order of its infractions; the last one may be its end."""
     return sorted((folder / "stills").glob(f"{key}-[0-9].jpg"))
 
 
 def read_trace(folder: Path, key: str) -> dict[str, list[Any]] | None:
-    """The columns of an episode's trace, None where it left none. Raises ValueError where it is damaged."""
+    """The columns of a trial's trace, None where it left none. Raises ValueError where it is damaged."""
     path = trace_path(folder, key)
-    return dict(episode_values(path)["trace"]) if path.is_file() else None
+    return dict(read_trace_file(path)["trace"]) if path.is_file() else None
 
 
-def episode_values(path: Path) -> dict[str, Any]:
+def read_trace_file(path: Path) -> dict[str, Any]:
     """What a trace's file holds, `trace` at least. Raises ValueError where it is damaged."""
     content = path.read_bytes()
     try:
         values = read_json(gzip.decompress(content), dict[str, Any])
-        columns = as_type(values.get("trace"), dict[str, list[Any]])
-        if missing := [name for name in COLUMNS if name not in columns]:
-            raise ValueError(f"it lacks {missing[0]}")
-        if len(set(map(len, columns.values()))) != 1 or not columns["time"]:
-            raise ValueError("its columns are empty or of different lengths")
-        for name in ("time", "x", "y", "speed", "route_done"):
-            as_type(columns[name], list[float])
+        _check_columns(as_type(values.get("trace"), dict[str, list[Any]]))
         return values
     except (gzip.BadGzipFile, EOFError, zlib.error, ValueError) as error:
         raise ValueError(f"found a damaged trace {path} ({error}): remove it, then it is done without") from error
+
+
+def _check_columns(columns: dict[str, list[Any]]) -> None:
+    """Raises ValueError where a trace lacks a column or a row."""
+    if missing := [name for name in COLUMNS if name not in columns]:
+        raise ValueError(f"it lacks {missing[0]}")
+    if len(set(map(len, columns.values()))) != 1 or not columns["time"]:
+        raise ValueError("its columns are empty or of different lengths")
+    for name in REQUIRED:
+        as_type(columns[name], list[float])

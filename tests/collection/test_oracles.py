@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from caldrive.agents.cal import CALAgent, OraclePerception
-from caldrive.collection.perturbation import HiddenCars, Tailgater
+from caldrive.collection.oracles import HiddenCarsOracle, TailgatingOracle
 from caldrive.control.controller import CALController, ControlConfig
 from caldrive.control.patience import PatienceConfig
 from caldrive.datatypes import MAX_VEHICLE_DISTANCE, Pose
@@ -38,18 +38,18 @@ def nearest(world: StraightRoad, perception: OraclePerception, seconds: float = 
 @pytest.mark.parametrize("gap", [0.5, 1.5, 3.0, 4.0])
 def test_a_tailgater_stops_at_his_gap_and_hits_nobody(gap: float) -> None:
     world = road(lead=lambda time: 80.0)
-    assert 0.3 * gap < nearest(world, Tailgater(world.truth, gap)) < gap + 0.8
+    assert 0.3 * gap < nearest(world, TailgatingOracle(world.truth, gap)) < gap + 0.8
 
 
 def test_others_stop_farther_away() -> None:
     world = road(lead=lambda time: 80.0)
     assert nearest(world, OraclePerception(world.truth)) > 4.5
-    assert 2.0 < nearest(world, HiddenCars(world.truth)) < 5.0
+    assert 2.0 < nearest(world, HiddenCarsOracle(world.truth)) < 5.0
 
 
 def stopping_place(world: StraightRoad, seconds: float) -> float:
     """Where the front axle of a tailgater stands in the end, as an arc length in m."""
-    agent = CALAgent(Tailgater(world.truth, 1.0), CALController(PATIENT))
+    agent = CALAgent(TailgatingOracle(world.truth, 1.0), CALController(PATIENT))
     observation = world.reset(AWAY)
     for _ in range(round(seconds / world.dt)):
         observation = world.step(agent.act(observation))
@@ -70,7 +70,7 @@ def test_a_tailgater_waits_for_people_who_walk_between_him_and_a_car_that_drives
     assert stopping_place(crossed, 26.0) < there + 0.3
 
 
-@pytest.mark.parametrize("kind", [HiddenCars, lambda truth: Tailgater(truth, 1.0)])
+@pytest.mark.parametrize("kind", [HiddenCarsOracle, lambda truth: TailgatingOracle(truth, 1.0)])
 def test_on_an_empty_road_all_are_told_the_truth(kind: Callable[..., OraclePerception]) -> None:
     world = road(light=5.0)
     observation = world.reset(AWAY)

@@ -1,0 +1,122 @@
+"""A person's own pictures, one after the other: the frames of a video, or the files of a folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import av
+import numpy as np
+from PIL import Image as Picture
+from PIL import ImageOps
+
+from caldrive.datatypes import DT, Image
+
+ENDINGS = (".png", ".jpg", ".jpeg")
+USUAL_RATE = 1 / DT  # pictures a second where nothing says how many: as the network learnt
+
+
+@dataclass(frozen=True)
+class SourcePicture:
+    """One picture (H, W, 3). number: from 0; file: its name in a folder, empty in a video; time in s."""
+
+    number: int
+    file: str
+    time: float
+    image: Image
+
+
+class PictureSource(Protocol):
+    """Pictures in their order. name: for captions; rate: how many a second; count: how many, None where not known."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def count(self) -> int | None: ...
+
+    def __iter__(self) -> Iterator[SourcePicture]: ...
+
+
+class PictureFolder:
+    """The pictures of a folder (.png, .jpg, .jpeg), by name: 2.png comes before 10.png."""
+
+    rate = USUAL_RATE
+
+    def __init__(self, name: str, files: list[Path]) -> None:
+        self.name, self.files, self.count = name, sorted(files, key=_natural), len(files)
+
+    def __iter__(self) -> Iterator[SourcePicture]:
+        for number, file in enumerate(self.files):
+            yield SourcePicture(number, file.name, number / self.rate, _read_picture(file))
+
+
+def _natural(file: Path) -> list[str | int]:
+    """A name with its numbers by value; texts and numbers alternate, so that any two can be compared."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", file.name)]
+
+
+def _read_picture(file: Path) -> Image:
+    try:
+        with Picture.open(file) as picture:
+            return np.asarray(ImageOps.exif_transpose(picture).convert("RGB"))
+    except (OSError, ValueError, SyntaxError, Picture.DecompressionBombError) as error:
+        raise ValueError(
+            f"found that {file} cannot be read as a picture, wanted a sound one: replace it, or take it out"
+        ) from error
+
+
+class VideoFile:
+    """The frames of a video's first picture stream, upright. Raises ValueError where a file is no video."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.name = path, path.name
+        with self._opened() as container:
+            if not container.streams.video:
+                raise ValueError(f"found no pictures in {path}, wanted a video: give another file")
+            stream = container.streams.video[0]
+            self.rate = float(stream.average_rate or stream.guessed_rate or USUAL_RATE)
+            self.count = stream.frames or None
+
+    def __iter__(self) -> Iterator[SourcePicture]:
+        with self._opened() as container:
+            for number, frame in enumerate(container.decode(video=0)):
+                image: Image = frame.to_ndarray(format="rgb24").astype(np.uint8, copy=False)
+                time = frame.time if frame.time is not None else number / self.rate
+                yield SourcePicture(number, "", time, _upright(image, getattr(frame, "rotation", 0)))
+
+    @contextmanager
+    def _opened(self) -> Iterator[av.container.InputContainer]:
+        try:
+            with av.open(str(self.path)) as container:
+                yield container
+        except av.FFmpegError as error:
+            raise ValueError(
+                f"found that {self.path} cannot be read as a video, wanted a sound one such as an .mp4: "
+                f"give another file, or a folder of pictures ({', '.join(ENDINGS)})"
+            ) from error
+
+
+def _upright(image: Image, degrees: int) -> Image:
+    """The picture as a player shows it: telephones store it lying, with the angle (counter-clockwise) to turn it by."""
+    return np.ascontiguousarray(np.rot90(image, round(degrees / 90)))
+
+
+def open_source(path: Path) -> PictureSource:
+    """The pictures of a video, of a folder, or of one picture's file.
+
+    Raises FileNotFoundError where there is nothing, ValueError where there is no picture in it.
+    """
+    if path.is_dir():
+        files = [file for file in path.iterdir() if file.suffix.lower() in ENDINGS and not file.name.startswith(".")]
+        if not files:
+            raise ValueError(f"found no picture in {path}, wanted files that end in {', '.join(ENDINGS)}: give another")
+        return PictureFolder(path.resolve().name, files)
+    if not path.is_file():
+        raise FileNotFoundError(f"found nothing at {path}, wanted a video or a folder of pictures: check the path")
+    return PictureFolder(path.name, [path]) if path.suffix.lower() in ENDINGS else VideoFile(path)

@@ -1,0 +1,87 @@
+"""`caldrive town`: a sheet of camera images, a plan with coordinates, or both."""
+
+from __future__ import annotations
+
+import io
+import json
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image as Picture
+
+from caldrive.cli import main
+
+
+def town_json(*arguments: str) -> dict[str, Any]:
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        assert main(["town", *arguments, "--json"]) == 0
+    answer: dict[str, Any] = json.loads(printed.getvalue())
+    return answer
+
+
+@pytest.fixture
+def _plain_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A contact sheet that needs no camera."""
+
+    def sheet(town: str, randomised: int) -> np.ndarray[Any, Any]:
+        return np.full((40, 80, 3), len(town) + randomised, np.uint8)
+
+    monkeypatch.setattr("caldrive.visualization.contact_sheet.contact_sheet", sheet)
+
+
+@pytest.mark.usefixtures("_plain_sheet")
+def test_town_writes_its_sheet(tmp_path: Path) -> None:
+    answer = town_json("--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
+    assert (answer["width"], answer["height"]) == (160, 80)
+    assert Picture.open(answer["sheet"]).size == (160, 80)
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["town.png"]
+
+
+@pytest.mark.usefixtures("_plain_sheet")
+def test_town_without_options_writes_the_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert town_json()["sheet"] == "out/town.png"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["town.png"]
+
+
+def test_town_writes_the_plan_alone_where_only_that_is_asked_for(tmp_path: Path) -> None:
+    answer = town_json("--town", "town02", "--plan", str(tmp_path / "plan.png"), "--width", "1100")
+    assert (answer["plan_width"], answer["plan_height"]) == Picture.open(answer["plan"]).size
+    assert answer["plan_width"] == 1100
+    assert "sheet" not in answer
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.png"]
+
+
+@pytest.mark.usefixtures("_plain_sheet")
+def test_town_writes_both(tmp_path: Path) -> None:
+    answer = town_json("--plan", str(tmp_path / "plan.png"), "--sheet", str(tmp_path / "sheet.png"))
+    assert (answer["plan"], answer["sheet"]) == (str(tmp_path / "plan.png"), str(tmp_path / "sheet.png"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.png", "sheet.png"]
+
+
+MISTAKES = {
+    "a plan of another kind": (["--plan", "plan.pdf"], "ends in .png"),
+    "a sheet of another kind beside a plan": (["--plan", "plan.png", "--sheet", "sheet.jpg"], "ends in .png"),
+    "a plan too small to read": (["--plan", "plan.png", "--width", "100"], "type --width 1600"),
+    "one file for both": (["--plan", "a.png", "--sheet", "a.png"], "type another --plan"),
+    "looks of a plan": (["--plan", "plan.png", "--randomised", "2"], "type --sheet FILE"),
+    "an unknown town": (["--plan", "plan.png", "--town", "mars"], "type --town town01"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_ends_in_one_sentence_and_leaves_nothing(
+    mistake: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments, expected = MISTAKES[mistake]
+    assert main(["town", *arguments]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("caldrive: found ")
+    assert printed.count("\n") == 1
+    assert expected in printed
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,65 @@
+"""A world of one's own, the straight road of the tests, driven by the command line's code."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+import tests.fakes
+from caldrive.driving.setup import make_world
+from caldrive.interfaces import is_mapped
+from caldrive.visualization.hud import CAMERA, SIZE
+from tests.agents.test_own_agents import refusal, write_agent
+from tests.commands.test_commands import run_json
+
+WORLD = f"{tests.fakes.__file__}:StraightRoad"
+DRIVE = ["drive", "--agent", "oracle", "--world", WORLD, "--from", "0,0", "--to", "60,0"]
+
+
+def test_it_has_neither_map_nor_movable_cameras() -> None:
+    assert not is_mapped(make_world(WORLD))
+
+
+def test_the_oracle_reaches_a_place_and_is_filmed_on_the_way(tmp_path: Path) -> None:
+    report = run_json(*DRIVE, "--out", str(tmp_path))
+    (episode,) = report["episodes"]
+    assert episode["outcome"] == "success"
+    assert episode["distance"] == pytest.approx(58, abs=1)
+    assert episode["scenario"]["task"] == "own"
+    steps = len(json.loads((tmp_path / "episode-000.json").read_text())["trace"]["time"])
+    with av.open(report["video"]) as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert [frame.shape for frame in frames] == [(SIZE[1], SIZE[0], 3)] * (steps + 15)
+    picture = frames[steps // 2][50 : CAMERA.height]
+    assert picture.mean() == pytest.approx(float(np.mean(tests.fakes.IMAGE)), abs=6)  # what the agent's camera shows
+
+
+def test_an_agent_of_ones_own_drives_in_it_twice_the_same(tmp_path: Path) -> None:
+    agent = write_agent(tmp_path, "def act(self, observation):\n    return Control(throttle=0.5)")
+    report = run_json(
+        *("drive", "--agent", agent, "--world", WORLD, "--from", "0,0", "--to", "30,0", "--out", str(tmp_path))
+    )
+    assert report["episodes"][0]["outcome"] == "success"
+    arguments = ("--agent", agent, "--world", WORLD, "--from", "0,0", "--to", "30,0")
+    assert run_json("determinism", *arguments)["equal"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--world", WORLD], "type --from X,Y --to X,Y"),
+        (["--world", "mars", "--from", "0,0", "--to", "9,0"], "found world 'mars', wanted embedded or your own class"),
+        (["--world", "{tmp}/own.py:Half", "--from", "0,0", "--to", "9,0"], "Half has no step, wanted a world with dt"),
+        (["--world", WORLD, "--from", "0,zero", "--to", "9,0"], "found --from 0,zero, wanted X,Y or X,Y,HEADING"),
+    ],
+)
+def test_what_is_no_world_or_no_place_is_named(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "own.py").write_text("class Half:\n    dt = 0.1\n    def reset(self, scenario): pass\n")
+    command = ["drive", "--agent", "oracle", "--out", str(tmp_path / "out"), *arguments]
+    assert message in refusal(capsys, *(one.replace("{tmp}", str(tmp_path)) for one in command))

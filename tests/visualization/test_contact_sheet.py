@@ -1,0 +1,52 @@
+"""A town's contact sheet: a row for each weather, or for each random look."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from caldrive.datatypes import Image
+from caldrive.visualization.contact_sheet import CAPTION, MARGIN, cars_and_people, contact_sheet, viewpoints
+from caldrive.world.roads.network import RoadNetwork
+
+SIZE = (64, 32)
+
+
+def images(sheet: Image, row: int) -> Image:
+    """The images of a row, without their captions."""
+    top = MARGIN + row * (SIZE[1] + CAPTION + MARGIN) + CAPTION
+    return sheet[top : top + SIZE[1]].astype(int)
+
+
+def test_there_is_a_row_for_each_weather_and_a_column_for_each_viewpoint() -> None:
+    sheet = contact_sheet("town02", SIZE, (1, 13))
+    assert sheet.shape == (MARGIN + 2 * (32 + CAPTION + MARGIN), MARGIN + 3 * (64 + MARGIN), 3)
+    assert np.abs(images(sheet, 0) - images(sheet, 1)).mean() > 5
+
+
+def test_there_is_a_row_for_each_random_look() -> None:
+    sheet = contact_sheet("town01", SIZE, (1,), randomised=2)
+    assert sheet.shape[0] == MARGIN + 2 * (32 + CAPTION + MARGIN)
+    usual = contact_sheet("town01", SIZE, (1,))
+    first, second, own = images(sheet, 0), images(sheet, 1), images(usual, 0)
+    assert min(np.abs(first - second).mean(), np.abs(first - own).mean(), np.abs(second - own).mean()) > 5
+
+
+def test_random_looks_take_the_weathers_in_turn() -> None:
+    two, one = (contact_sheet("town01", SIZE, weathers, randomised=2) for weathers in ((1, 13), (1,)))
+    assert (images(two, 0) == images(one, 0)).all()
+    assert np.abs(images(two, 1) - images(one, 1)).mean() > 2
+
+
+def test_viewpoints_show_a_light_a_sign_and_a_bend(town: RoadNetwork) -> None:
+    places = dict(viewpoints(town))
+    assert list(places) == ["light", "sign", "bend"]
+    for name in ("light", "bend"):
+        town.lane_at(places[name])
+    cars, people = cars_and_people(places["light"])
+    assert (cars[0].speed, [person.on_road for person in people]) == (0.0, [True, False, False, False])
+
+
+def test_an_unknown_town_is_refused() -> None:
+    with pytest.raises(ValueError, match="type --town town01"):
+        contact_sheet("mars")
