@@ -1,4 +1,4 @@
-"""What mkdocs does while it builds the pages: the lists of files are made from the code, so that they are always true.
+"""What mkdocs does while it builds the pages: lists of files from the code, and a look at what a page would fetch.
 
 A line `<!-- files: world/roads -->` in a page becomes a table of that folder's files, with the first sentence of each
 one's docstring.
@@ -13,6 +13,7 @@ from typing import Any
 
 CODE = Path(__file__).parents[1] / "src" / "caldrive"
 PLACE = re.compile(r"^<!-- files: (\S+) -->$", re.MULTILINE)
+FETCHED = re.compile(r'<(?:script|img|iframe|link)\b[^>]*\b(?:src|href)="(?:https?:)?//[^"]*"')
 
 
 def first_sentence(path: Path) -> str:
@@ -35,3 +36,10 @@ def files_table(folder: str) -> str:
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Called by mkdocs for each page."""
     return PLACE.sub(lambda place: files_table(place.group(1)), markdown)
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Called by mkdocs for each finished page. Raises ValueError where it would fetch something from elsewhere."""
+    if elsewhere := FETCHED.search(output):
+        raise ValueError(f"found {elsewhere.group()}, wanted a page that fetches nothing: correct mkdocs.yml")
+    return output

@@ -16,18 +16,9 @@ import time
 from pathlib import Path
 
 DRIVE = [
-    "--town",
-    "town02",
-    "--weather",
-    "14",
-    "--task",
-    "navigation-dynamic",
-    "--cap",
-    "20",
-    "--seconds",
-    "60",
+    "--town", "town02", "--weather", "14", "--task", "navigation-dynamic", "--cap", "20", "--seconds", "60",
     "--no-video",
-]
+]  # fmt: skip
 
 
 def drive(out: Path, arguments: list[str]) -> str:
