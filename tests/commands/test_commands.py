@@ -137,6 +137,7 @@ def test_an_image_that_tells_nothing_brakes_to_a_stand_and_says_why(model: str) 
         assert agent.decision is not None
         assert "black" in agent.decision.note
     agent.act(Observation(0.0, black + 90, 0.0, Command.STRAIGHT))
+    assert agent.decision is not None
     assert agent.decision.note == ""
 
 

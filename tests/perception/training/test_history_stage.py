@@ -31,7 +31,7 @@ def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path
     long = replace(HISTORY, history_steps=60, learning_rate=3e-3, augmentation=AugmentationConfig(enabled=False))
     before = load_network(train(replace(long, history_steps=0), folder, tmp_path / "before", TINY))[0]
     after, info = load_network(train(long, folder, tmp_path / "after", TINY))
-    rows = [json.loads(line) for line in (tmp_path / "after" / "metrics.jsonl").open()]
+    rows = [json.loads(line) for line in (tmp_path / "after" / "metrics.jsonl").read_text().splitlines()]
     assert [row["step"] for row in rows] == list(range(1, 67))
     assert np.mean([row["loss"] for row in rows[-10:]]) < 0.8 * np.mean([row["loss"] for row in rows[6:16]])
     assert rows[-1]["validation/loss"] == info.metrics["loss"]

@@ -49,7 +49,7 @@ def test_the_papers_training_adds_no_segmentation_and_no_alternative_commands(tm
 
 def test_validation_metrics_are_written_and_kept_with_the_network(folder: Path, tmp_path: Path) -> None:
     model = train(replace(SHORT, evaluate_every=3), folder, tmp_path, TINY)
-    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").open()]
+    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
     assert [row["step"] for row in rows if "validation/loss" in row] == [3, 6]
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
     network, info = load_network(model)
