@@ -9,19 +9,26 @@ SHELL := /bin/bash
 MODEL := out/model
 RESULTS := out/results
 
-.PHONY: drive test lint model results clean
+.PHONY: drive test lint docs coverage model results clean
 drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
 # Each of the two has a core of its own: more threads would only take turns.
-test: $(READY) lint
-	LP_NUM_THREADS=0 OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 $(ARGS)
+PYTEST := LP_NUM_THREADS=0 OMP_NUM_THREADS=1 $(BIN)/pytest -n 2
+
+test: $(READY) lint docs
+	$(PYTEST) $(ARGS)
 
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python scripts/large_files.py
+
+# The pages in out/docs; a warning is an error. Nothing is fetched.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 # From nothing to a network like the one that the package ships; a run that was stopped goes on. The log keeps every step's time.
 model: $(READY)
@@ -36,8 +43,9 @@ model: $(READY)
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
-# The suites for both agents, and in docs/results their reports and every episode's line, from which the tables follow
-# again; a run that was stopped goes on. An episode that one suite shares with another is driven once.
+# The suites for both agents, and in docs/results the report's tables and every episode's line (compressed), from which
+# the tables follow again; the HTML report stays in out/results. A run that was stopped goes on. An episode that one
+# suite shares with another is driven once.
 results: $(READY)
 	@for agent in oracle cal; do \
 		known=(); \
@@ -48,10 +56,12 @@ results: $(READY)
 		done; \
 	done
 	@for suite in corl2017 nocrash traffic-school; do \
-		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out docs/results/$$suite; \
+		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out $(RESULTS)/$$suite; \
+		mkdir -p docs/results/$$suite/{oracle,cal}; \
+		cp $(RESULTS)/$$suite/report.md docs/results/$$suite; \
 		for agent in oracle cal; do \
-			mkdir -p docs/results/$$suite/$$agent; \
-			cp $(RESULTS)/$$suite/$$agent/{run.json,results.jsonl} docs/results/$$suite/$$agent; \
+			cp $(RESULTS)/$$suite/$$agent/run.json docs/results/$$suite/$$agent; \
+			gzip -9nc $(RESULTS)/$$suite/$$agent/results.jsonl > docs/results/$$suite/$$agent/results.jsonl.gz; \
 		done; \
 	done
 
@@ -59,7 +69,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
 		{ echo "Found $$($(PYTHON) --version), need Python 3.11 to 3.13: install one or run make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,test]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,docs,test]'
 	touch $(READY)
 
 clean:

@@ -28,7 +28,7 @@ from caldrive.control.presets import PAPER
 from caldrive.datatypes import CameraConfig, Control, Observation, Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
-from caldrive.driving.tasks import scenarios
+from caldrive.driving.tasks import task_scenarios
 from caldrive.interfaces import Agent
 from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.provenance import BEHAVIOUR_VERSION
@@ -83,7 +83,7 @@ def driven(world: EmbeddedWorld, agent: Agent, scenario: Scenario) -> list[float
 
 def limited(town: str, task: str, number: int, weather: int = 6, **traffic: int) -> Scenario:
     """A task's scenario that ends after 30 s."""
-    return replace(scenarios(town, task, weather, seed=3, **traffic)[number], time_limit=30.0)  # type: ignore[arg-type]
+    return replace(task_scenarios(town, task, weather, seed=3, **traffic)[number], time_limit=30.0)  # type: ignore[arg-type]
 
 
 def drives() -> Numbers:

@@ -42,7 +42,7 @@ class Drive:
         return [abs(step.truth.affordances.center_distance) for step in self.steps]
 
     @property
-    def states(self) -> set[DriveState]:
+    def states(self) -> set[str | None]:
         return {step.decision.state for step in self.steps if step.decision}
 
     @property

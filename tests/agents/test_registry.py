@@ -9,7 +9,7 @@ from caldrive.agents.cal import CALAgent
 from caldrive.agents.registry import SHIPPED_MODEL
 from caldrive.agents.settings import AgentSettings
 from caldrive.driving.setup import set_up
-from caldrive.driving.tasks import scenarios
+from caldrive.driving.tasks import task_scenarios
 from caldrive.interfaces import is_recordable
 
 
@@ -22,7 +22,7 @@ def test_the_network_that_ships_knows_how_far_aside_it_is_and_comes_back(aside: 
     world, agent = set_up(AgentSettings(cap=20.0))
     assert is_recordable(world)
     assert isinstance(agent, CALAgent)
-    for scenario in scenarios("town01", "straight", weather=8)[:2]:
+    for scenario in task_scenarios("town01", "straight", weather=8)[:2]:
         world.reset(scenario)
         observation, seen = world.displace(aside, 0.0), []
         agent.reset()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -59,7 +60,8 @@ def test_reset_starts_a_fresh_episode() -> None:
 def test_brakes_blindly_where_an_affordance_is_no_number(name: str) -> None:
     controller = CALController(DEFAULT)
     steer = controller.step(Affordances(relative_angle=0.1), 5.0, Command.STRAIGHT).control.steer
-    blind = controller.step(replace(Affordances(), **{name: float("nan")}), 5.0, Command.STRAIGHT)
+    change: dict[str, Any] = {name: float("nan")}
+    blind = controller.step(replace(Affordances(), **change), 5.0, Command.STRAIGHT)
     assert blind.state is DriveState.BLIND
     assert blind.control.brake > 0
     assert blind.control.steer == steer

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -36,7 +37,7 @@ def decide(
     return longitudinal_step(Situation(affordances, speed, command, limit), memory, 0.1, laws)
 
 
-def paper(speed: float, limit: float = 30.0, command: Command = STRAIGHT, **affordances: float) -> Longitudinal:
+def paper(speed: float, limit: float = 30.0, command: Command = STRAIGHT, **affordances: Any) -> Longitudinal:
     return decide(Affordances(**affordances), speed, command, limit, Memory(), PAPER_LAWS)
 
 
@@ -122,7 +123,7 @@ def test_the_most_important_state_wins(laws: LongitudinalConfig) -> None:
         (DriveState.RED_LIGHT, {"red_light": 1.0}, 60.0),
         (DriveState.HAZARD_STOP, {"hazard_stop": 1.0}, 60.0),
     ]
-    seen: dict[str, float] = {}
+    seen: dict[str, Any] = {}
     for state, change, speed in layers:
         seen |= change
         assert decide(Affordances(**seen), speed, STRAIGHT, 30.0, Memory(), laws).state is state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -15,12 +16,12 @@ from caldrive.datatypes import HAZARD_DISTANCE, KMH, Affordances, Command, Decis
 CREEP = DEFAULT.patience.creep_speed
 
 
-def act(controller: CALController, speed: float = 0.0, **affordances: float) -> Decision:
+def act(controller: CALController, speed: float = 0.0, **affordances: Any) -> Decision:
     """A step at a speed in km/h."""
     return controller.step(Affordances(**affordances), speed * KMH, Command.STRAIGHT)
 
 
-def wait(seconds: float, config: ControlConfig = DEFAULT, **affordances: float) -> tuple[CALController, list[Decision]]:
+def wait(seconds: float, config: ControlConfig = DEFAULT, **affordances: Any) -> tuple[CALController, list[Decision]]:
     """What a standing car does that moves off as soon as it is let."""
     controller, results, speed = CALController(config), list[Decision](), 0.0
     for _ in range(round(seconds / 0.1)):

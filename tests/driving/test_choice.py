@@ -13,7 +13,7 @@ import pytest
 from caldrive.cli import main
 from caldrive.driving.choice import OWN_TASK, chosen_scenarios, parse_place
 from caldrive.driving.settings import EpisodeSettings
-from caldrive.driving.tasks import scenarios
+from caldrive.driving.tasks import task_scenarios
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
 
@@ -23,7 +23,7 @@ SOUTH, NORTH = -math.pi / 2, math.pi / 2
 
 def test_a_tasks_routes_are_chosen_from_one_on_and_begin_again() -> None:
     settings = EpisodeSettings(town="town02", task="one-turn", route=23, seed=3)
-    of_task = scenarios("town02", "one-turn", 1, seed=3)
+    of_task = task_scenarios("town02", "one-turn", 1, seed=3)
     assert chosen_scenarios(settings, 4) == [of_task[k] for k in (23, 24, 0, 1)]
 
 

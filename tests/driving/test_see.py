@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -48,7 +48,9 @@ def test_the_network_is_given_the_rows_that_were_asked_for_in_its_size() -> None
     assert observation.image[:, 0, 0].tolist() == pytest.approx([45.5 + 2 * k for k in range(9)], abs=0.5)
     assert observation.command is Command.LEFT
     assert seen.rows == (45, 63)
-    assert seen.affordances == Affordances(hazard_stop=pytest.approx(54 / 255, abs=2e-3))
+    assert seen.affordances is not None
+    assert seen.affordances.hazard_stop == pytest.approx(54 / 255, abs=2e-3)
+    assert replace(seen.affordances, hazard_stop=0.0) == Affordances()
 
 
 def test_a_picture_that_tells_nothing_is_marked_and_the_next_is_looked_at() -> None:

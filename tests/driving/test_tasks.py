@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from caldrive.datatypes import Command
-from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, draw_routes, routes, scenarios
+from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, draw_routes, routes, task_scenarios
 from caldrive.geometry import wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route, plan_route
@@ -81,41 +81,41 @@ def test_the_routes_do_not_depend_on_the_seed() -> None:
 def test_only_the_dynamic_task_has_others_on_the_road(town: str, others: tuple[int, int]) -> None:
     for task in TASKS:
         wanted = others if task == "navigation-dynamic" else (0, 0)
-        assert {(scenario.n_vehicles, scenario.n_pedestrians) for scenario in scenarios(town, task)} == {wanted}
+        assert {(scenario.n_vehicles, scenario.n_pedestrians) for scenario in task_scenarios(town, task)} == {wanted}
 
 
 def test_others_can_be_asked_for_and_left_out() -> None:
     assert {
         (scenario.n_vehicles, scenario.n_pedestrians)
-        for scenario in scenarios("town02", "straight", cars=70, people=150)
+        for scenario in task_scenarios("town02", "straight", cars=70, people=150)
     } == {(70, 150)}
-    assert {scenario.n_vehicles for scenario in scenarios("town02", "navigation-dynamic", cars=0)} == {0}
+    assert {scenario.n_vehicles for scenario in task_scenarios("town02", "navigation-dynamic", cars=0)} == {0}
 
 
 def test_scenarios_carry_task_weather_and_their_own_seed() -> None:
-    one_turn = scenarios("town02", "one-turn", 14, seed=3)
+    one_turn = task_scenarios("town02", "one-turn", 14, seed=3)
     assert {(scenario.town, scenario.task, scenario.weather) for scenario in one_turn} == {("town02", "one-turn", 14)}
     assert len({scenario.seed for scenario in one_turn}) == 25
     assert {scenario.seed for scenario in one_turn}.isdisjoint(
-        scenario.seed for scenario in scenarios("town02", "one-turn", 14, seed=4)
+        scenario.seed for scenario in task_scenarios("town02", "one-turn", 14, seed=4)
     )
 
 
 def test_the_time_limit_is_that_of_the_paper_or_that_of_its_code() -> None:
     lengths = [route.length for route in planned("town02", "straight")]
-    paper, code = (scenarios("town02", "straight", time_limit=limit) for limit in ("paper", "code"))
+    paper, code = (task_scenarios("town02", "straight", time_limit=limit) for limit in ("paper", "code"))
     assert [scenario.time_limit for scenario in paper] == pytest.approx([length * 0.36 for length in lengths])
     assert [scenario.time_limit for scenario in code] == pytest.approx([length * 0.72 + 10 for length in lengths])
 
 
 def test_an_unknown_task_names_the_known_ones() -> None:
     with pytest.raises(ValueError, match="found task 'parking', wanted one of straight, one-turn, navigation"):
-        scenarios("town01", "parking")
+        task_scenarios("town01", "parking")
 
 
 def test_an_unknown_time_limit_is_refused() -> None:
     with pytest.raises(ValueError, match="found time limit 'none', wanted paper or code"):
-        scenarios("town02", "straight", time_limit="none")
+        task_scenarios("town02", "straight", time_limit="none")
 
 
 @pytest.mark.parametrize("task", ["straight", "one-turn", "navigation"])

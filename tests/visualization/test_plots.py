@@ -21,9 +21,9 @@ def test_a_drive_with_every_state_and_one_of_a_single_step_are_drawn(tmp_path: P
     }
     draw_speed(columns, "town01", tmp_path / "new" / "speed.png")
     draw_speed({name: values[:1] for name, values in columns.items()}, "stands", tmp_path / "stands.png")
-    pictures = [Image.open(path) for path in (tmp_path / "new" / "speed.png", tmp_path / "stands.png")]
-    assert all(picture.size == (1080, 324) for picture in pictures)
-    colors = {color for _, color in pictures[0].convert("RGB").getcolors(1 << 20) or ()}
+    with Image.open(tmp_path / "new" / "speed.png") as whole, Image.open(tmp_path / "stands.png") as short:
+        assert whole.size == short.size == (1080, 324)
+        colors = {color for _, color in whole.convert("RGB").getcolors(1 << 20) or ()}
     assert {(217, 83, 79), (240, 195, 109)} <= colors
 
 

@@ -23,7 +23,7 @@ from caldrive.datatypes import (
     Truth,
     VehicleState,
 )
-from caldrive.driving.tasks import scenarios
+from caldrive.driving.tasks import task_scenarios
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 from caldrive.visualization.episode_video import VideoWriter, caption
@@ -33,7 +33,7 @@ from caldrive.visualization.minimap import EGO, GOAL, ROUTE, MiniMap
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
 
-SCENARIO = scenarios("town02", "one-turn", 14)[0]
+SCENARIO = task_scenarios("town02", "one-turn", 14)[0]
 VIEW = np.full((CAMERA.height, CAMERA.width, 3), 200, np.uint8)
 MAP_LEFT = CAMERA.width - PANEL
 
@@ -65,9 +65,8 @@ def count(image: Image, color: tuple[int, int, int]) -> int:
 
 def read(path: Path) -> tuple[list[Image], float]:
     with av.open(str(path)) as film:
-        return [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)], float(
-            film.streams.video[0].average_rate
-        )
+        images = [np.asarray(frame.to_ndarray(format="rgb24"), np.uint8) for frame in film.decode(video=0)]
+        return images, float(film.streams.video[0].average_rate or 0.0)
 
 
 def test_a_video_has_all_its_frames_at_their_size_and_rate(tmp_path: Path) -> None:

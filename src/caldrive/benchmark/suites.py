@@ -13,7 +13,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
-from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, scenarios
+from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, task_scenarios
 from caldrive.files import read_json
 from caldrive.results import EpisodeResult, InfractionKind
 from caldrive.scenarios import Scenario, scenario_from_values, scenario_values
@@ -78,7 +78,7 @@ def _corl2017(seed: int, time_limit: str, routes: int = ROUTES_PER_TASK) -> Iter
     """The CoRL-2017 benchmark: the four tasks in each condition and weather."""
     for condition, town, weather in _by_weather():
         for task in TASKS:
-            chosen = scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)[:routes]
+            chosen = task_scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)[:routes]
             for k, scenario in enumerate(chosen):
                 yield Trial(key=f"{town}-w{weather:02d}-{task}-{k:02d}", condition=condition, scenario=scenario)
 
@@ -108,7 +108,7 @@ def _nocrash(seed: int, time_limit: str, fatal: tuple[InfractionKind, ...]) -> I
     for condition, town, weather in _by_weather():
         for density, traffic in DENSITIES.items():
             cars, people = traffic[town]
-            chosen = scenarios(
+            chosen = task_scenarios(
                 town, "navigation", weather, cars=cars, people=people, seed=_seed(seed, weather), time_limit=time_limit,
                 name=density,
             )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from caldrive.checks import MOST_SEED, require_within
 from caldrive.datatypes import KMH, Pose
 from caldrive.driving.settings import EpisodeSettings
-from caldrive.driving.tasks import scenarios
+from caldrive.driving.tasks import task_scenarios
 from caldrive.scenarios import Scenario
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _check(settings: EpisodeSettings, n: int) -> None:
 
 
 def _of_task(settings: EpisodeSettings, n: int) -> list[Scenario]:
-    of_task = scenarios(
+    of_task = task_scenarios(
         settings.town, settings.task, settings.weather, cars=settings.cars, people=settings.people, seed=settings.seed
     )
     require_within("--route", settings.route, 0, len(of_task) - 1, 0)

@@ -98,7 +98,7 @@ def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
     return route.time_limit if kind == "paper" else route.length / (5 * KMH) + 10
 
 
-def scenarios(
+def task_scenarios(
     town: str,
     task: str,
     weather: int = 1,

@@ -1,4 +1,4 @@
-"""Draws docs/frames.png from the areas, the car and the lanes of the code: python docs/make_frames.py"""
+"""Draws docs/frames.png from the areas, the car and the lanes of the code: python scripts/make_frames.py"""
 
 from __future__ import annotations
 
@@ -276,7 +276,7 @@ def main() -> None:
         axes.set_aspect("equal")
         axes.axis("off")
         axes.set_title(title, loc="left", fontsize=13, color=INK, weight="bold", x=0.02, pad=4)
-    figure.savefig(Path(__file__).with_name("frames.png"))
+    figure.savefig(Path(__file__).parents[1] / "docs" / "frames.png")
 
 
 if __name__ == "__main__":
