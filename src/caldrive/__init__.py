@@ -3,9 +3,9 @@
 One loop carries everything. A world shows an image, an agent turns it into six affordances and those into a control,
 the world moves on, and a referee who knows the truth writes down how it went:
 
-    from caldrive import CALAgent, CALController, EmbeddedWorld, OraclePerception, run_episode, task_scenarios
+    from caldrive import CALAgent, CALController, OraclePerception, make_world, run_episode, task_scenarios
 
-    world = EmbeddedWorld()                                    # EmbeddedWorld(CameraConfig()) for images
+    world = make_world()                                       # make_world(camera=CameraConfig()) for images
     agent = CALAgent(OraclePerception(world.truth), CALController())
     for scenario in task_scenarios("town01", "navigation-dynamic"):
         print(run_episode(world, agent, scenario).outcome)
@@ -47,7 +47,6 @@ if TYPE_CHECKING:  # what editors and type checkers read; tests/test_public_name
     from caldrive.results import EpisodeResult as EpisodeResult
     from caldrive.results import Outcome as Outcome
     from caldrive.scenarios import Scenario as Scenario
-    from caldrive.world.embedded import EmbeddedWorld as EmbeddedWorld
 
 __version__ = "0.1.0"
 
@@ -69,7 +68,6 @@ _HOMES = {
     "caldrive.perception.inference.predictor": ("NetworkPerception",),
     "caldrive.results": ("EpisodeResult", "Outcome"),
     "caldrive.scenarios": ("Scenario",),
-    "caldrive.world.embedded": ("EmbeddedWorld",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -44,6 +44,11 @@ class AffordanceSpec:
         return len(self.classes) or 1
 
     @property
+    def metric(self) -> str:
+        """The name of its figure in an evaluation: mean IoU of a discrete one, mean absolute error of the others."""
+        return f"{self.name}/{'iou' if self.discrete else 'mae'}"
+
+    @property
     def title(self) -> str:
         """The name in words."""
         return self.name.replace("_", " ")

@@ -90,6 +90,8 @@ def _defaults(verb: str, arguments: Sequence[str]) -> Any:
         )
     if not file and not (name and presets):
         return None
+    if name and presets:
+        presets = dict.fromkeys(presets, presets[name])  # what the command line says goes before what a file says
     options = presets[name] if name and presets else kind()
     return from_toml(Path(file), presets, options) if file else options
 
@@ -107,7 +109,8 @@ def _value(arguments: Sequence[str], option: str) -> str | None:
 def _refuse(event: Any, verb: str) -> None:
     """Raises ValueError with what the parser could not understand, in one sentence."""
     here = f"caldrive {verb} --help" if verb in VERBS else "caldrive --help"
-    raise ValueError(f"{_mistake(event, verb)}: type {here}")
+    mistake = _mistake(event, verb)
+    raise ValueError(mistake if ": type " in mistake else f"{mistake}: type {here}")
 
 
 def _mistake(event: Any, verb: str) -> str:
@@ -126,7 +129,10 @@ def _mistake(event: Any, verb: str) -> str:
         case _errors.BadValue():
             return f"found {name} without a value, wanted one"
         case _errors.InstantiationFailure():
-            return f"found that {name} cannot be ({' '.join(str(event.message).split())}), wanted another value"
+            reason = " ".join(str(event.message).split())
+            if reason.startswith("found"):  # a whole sentence of the settings' own
+                return reason
+            return f"found that {name} cannot be ({reason}), wanted another value"
         case _errors.InvalidChoice():
             return f"found {name} {event.value}, wanted one of {', '.join(event.choices)}"
     return "found options that do not go together, wanted those that do"

@@ -127,7 +127,8 @@ class Controller(Protocol):
 
 class Agent(Protocol):
     """A driver. It may also have an attribute `decision`, the reasons for the last control (a `Decision` or None), and
-    `camera`, the camera that it wants (a `CameraConfig`, or None where it looks at no image)."""
+    its class `camera`, the camera that it wants (a `CameraConfig`, or None where it looks at no image). A driver that
+    has nothing to forget may leave `reset` out."""
 
     def reset(self) -> None:
         """Start an episode."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 import pytest
@@ -47,8 +46,7 @@ class FailingCamera(StraightRoad):
 def free_road_network() -> Network:
     network = Network(TINY)
     for name, biases in FREE.items():
-        groups: Any = network.blocks[name].groups
-        for group in groups:
+        for group in network.blocks[name].groups:  # type: ignore[union-attr]
             torch.nn.init.zeros_(group.output.weight)
             group.output.bias.data = torch.tensor(biases)
     return network

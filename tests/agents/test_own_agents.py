@@ -6,12 +6,14 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import av
 import pytest
 
+from caldrive import plugins
 from caldrive.agents.registry import agent_entry
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.run_folder import RunFolder
@@ -88,6 +90,19 @@ def test_it_drives_and_is_filmed(agent: str, tmp_path: Path) -> None:
     for column in ("state", "speed_limit", "target_speed", "note", "predicted_hazard_stop"):
         assert trace[column] == [None] * 11
     assert (tmp_path / "episode-000.png").stat().st_size > 1000
+
+
+def test_it_may_be_a_class_of_a_module_or_offered_by_an_installed_package(
+    agent: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.syspath_prepend(str(Path(agent.rpartition(":")[0]).parent))
+    entry = EntryPoint("cruiser", "cruiser:Cruiser", "caldrive.agents")
+    monkeypatch.setattr(plugins, "entry_points", lambda group, name="cruiser": [entry] if name == "cruiser" else [])
+    drives = [run_json(*DRIVE, "--no-video", "--agent", name, "--out", str(tmp_path)) for name in (agent, "cruiser")]
+    drives.append(run_json(*DRIVE, "--no-video", "--agent", "cruiser:Cruiser", "--out", str(tmp_path)))
+    assert drives[0] == drives[1] == drives[2]
+    refused = refusal(capsys, *DRIVE, "--agent", "crusier", "--out", str(tmp_path))
+    assert "found agent 'crusier', wanted one of cal, oracle, cruiser, or your own class" in refused
 
 
 def test_a_benchmark_broken_off_goes_on_to_the_same_results(
@@ -191,12 +206,12 @@ def test_nonsense_in_a_benchmarks_worker_names_the_episode(
 ) -> None:
     agent = write_agent(tmp_path, "def act(self, observation):\n    return Control(0.0) if observation.time < 1 else 7")
     for workers in ("1", "2"):
-        said = refusal(
+        message = refusal(
             *(capsys, "benchmark", "--agent", agent, "--suite", str(short_suite), "--workers", workers),
             *("--out", str(tmp_path / "out")),
         )
-        assert "Own returned 7 at step 10 (1.0 s), wanted a Control" in said
-        assert "in episode town01-w01-" in said
+        assert "Own returned 7 at step 10 (1.0 s), wanted a Control" in message
+        assert "in episode town01-w01-" in message
 
 
 @pytest.mark.parametrize(
@@ -223,8 +238,8 @@ def test_an_option_that_it_would_never_see_is_refused(
     option: str, agent: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     value = "paper" if option == "controller" else str(tmp_path)
-    said = refusal(capsys, *DRIVE, "--agent", agent, f"--{option}", value, "--out", str(tmp_path / "out"))
-    assert f"but Cruiser takes none: leave --{option} out" in said
+    message = refusal(capsys, *DRIVE, "--agent", agent, f"--{option}", value, "--out", str(tmp_path / "out"))
+    assert f"but Cruiser takes none: leave --{option} out" in message
 
 
 def test_a_decision_may_say_some_things_only_and_in_numpys_numbers(short_suite: Path, tmp_path: Path) -> None:

@@ -69,8 +69,8 @@ def test_a_constant_that_there_is_not_is_named(
 ) -> None:
     file = tmp_path / "laws.toml"
     file.write_text(text)
-    said = refusal(capsys, *DRIVE, "--controller", str(file), "--out", str(tmp_path / "out"))
-    assert message.format(file=file) in said
+    printed = refusal(capsys, *DRIVE, "--controller", str(file), "--out", str(tmp_path / "out"))
+    assert message.format(file=file) in printed
 
 
 def test_a_class_of_ten_lines_drives(tmp_path: Path) -> None:

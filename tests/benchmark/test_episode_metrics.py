@@ -71,8 +71,8 @@ AWAY = [2.0, 4.0, 6.0, 8.0, 8.0, 8.0, 8.0, 8.0]
 def test_a_red_light_is_obeyed_where_the_car_stood_before_it_and_did_not_run_it(
     red: list[int], speed: list[float], run: list[float], obeyed: int
 ) -> None:
-    time = np.arange(len(red), dtype=np.float64) * 0.5
-    assert red_lights_obeyed(time, np.array(red, float), np.array(speed), run) == obeyed
+    time = 0.5 * np.arange(len(red), dtype=np.float64)
+    assert red_lights_obeyed(time, np.array(red, np.float64), np.array(speed, np.float64), run) == obeyed
 
 
 def test_a_blind_frame_is_no_right_answer() -> None:
@@ -81,3 +81,12 @@ def test_a_blind_frame_is_no_right_answer() -> None:
         episode.add(step(k / 10, UNKNOWN if k < 5 else replace(true, hazard_stop=0.0), true))
     metrics = episode.metrics([])
     assert (metrics["error/hazard_stop"], metrics["error/relative_angle"]) == (1.0, 0.0)
+
+
+def test_an_affordance_that_is_never_known_has_no_error_and_the_others_do() -> None:
+    episode, true = EpisodeMetrics(), Affordances()
+    for k in range(10):
+        episode.add(step(k / 10, replace(UNKNOWN, center_distance=0.5 if k % 2 else 0.1), true))
+    metrics = episode.metrics([])
+    assert metrics["error/center_distance"] == pytest.approx(0.3)
+    assert {name for name in metrics if name.startswith("error/")} == {"error/center_distance", "error/speed_sign"}

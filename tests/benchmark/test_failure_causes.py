@@ -7,32 +7,32 @@ from tests.benchmark.traces import after, trace
 
 
 def test_a_car_that_leaves_its_lane_says_what_it_did_not_see() -> None:
-    found = failure_cause(
+    cause = failure_cause(
         trace(
             true_center_distance=after(200, 1.5, before=0.4), predicted_center_distance=0.1, command="left",
             true_relative_angle=0.14,
         )
     )  # fmt: skip
-    assert (found.event, found.x, found.y, found.command) == ("left its lane", 100.0, 0.0, "left")
-    assert found.seen == "relative angle off by 0.14 rad, center distance off by 0.35 m"
-    assert str(found).startswith("left its lane at (100, 0), left: relative angle")
+    assert (cause.event, cause.x, cause.y, cause.command) == ("left its lane", 100.0, 0.0, "left")
+    assert cause.seen == "relative angle off by 0.14 rad, center distance off by 0.35 m"
+    assert str(cause).startswith("left its lane at (100, 0), left: relative angle")
 
 
 def test_a_car_that_stands_for_nothing_says_what_it_saw() -> None:
     still = {"speed": after(300, 0.0, before=5.0), "predicted_hazard_stop": after(300, 0.7)}
-    found = failure_cause(trace(state=after(300, "hazard stop", before="cruising"), **still))
-    assert (found.event, found.x) == ("stopped without a hazard", 150.0)
-    assert found.seen == "hazard stop seen with 0.70"
+    cause = failure_cause(trace(state=after(300, "hazard stop", before="cruising"), **still))
+    assert (cause.event, cause.x) == ("stopped without a hazard", 150.0)
+    assert cause.seen == "hazard stop seen with 0.70"
     red = failure_cause(trace(state=after(300, "red light", before="cruising"), speed=after(300, 0.0, before=5.0)))
     assert red.event == "stopped without a red light"
 
 
 def test_an_agent_without_affordances_left_its_lane_or_stood_all_the_same() -> None:
     unseen = dict.fromkeys(("predicted_center_distance", "predicted_relative_angle", "predicted_hazard_stop"))
-    left = failure_cause(trace(true_center_distance=after(200, 1.5), **unseen))
-    assert str(left) == "left its lane at (100, 0), straight: the agent gives no affordances"
+    cause = failure_cause(trace(true_center_distance=after(200, 1.5), **unseen))
+    assert str(cause) == "left its lane at (100, 0), straight: the agent gives no affordances"
     stop = {"state": after(300, "hazard stop", before="waiting"), "speed": after(300, 0.0, before=5.0)}
-    assert failure_cause(trace(**stop, **unseen)).seen == left.seen
+    assert failure_cause(trace(**stop, **unseen)).seen == cause.seen
     assert failure_cause(trace(**stop | {"state": None}, **unseen)).event == "was too slow"
 
 
@@ -64,8 +64,8 @@ def test_what_came_first_counts() -> None:
 
 
 def test_places_that_failures_share_come_first() -> None:
-    left = [failure_cause(trace(true_center_distance=after(at, 1.5))) for at in (200, 203, 400)]
-    assert common_places(left) == [
+    causes = [failure_cause(trace(true_center_distance=after(at, 1.5))) for at in (200, 203, 400)]
+    assert common_places(causes) == [
         (("left its lane", 100, 0, "straight"), 2),
         (("left its lane", 200, 0, "straight"), 1),
     ]

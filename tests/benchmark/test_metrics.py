@@ -65,8 +65,8 @@ def test_cells_count_by_condition_and_task() -> None:
 def test_only_a_goal_reached_without_a_fault_of_ones_own_is_clean() -> None:
     hit = Infraction(InfractionKind.COLLISION_CAR, 1.0, 0, 0, at_fault=False)
     by_others = replace(driven(), episode=replace(driven().episode, infractions=(hit,)))
-    found = cells([driven(), by_others, driven(Outcome.TIMEOUT), driven(kinds=(InfractionKind.SIDEWALK,))])
-    assert [(cell.episodes, cell.successes, cell.clean) for cell in found] == [(4, 3, 2)]
+    counted = cells([driven(), by_others, driven(Outcome.TIMEOUT), driven(kinds=(InfractionKind.SIDEWALK,))])
+    assert [(cell.episodes, cell.successes, cell.clean) for cell in counted] == [(4, 3, 2)]
 
 
 def test_the_way_covered_never_leaves_its_bounds() -> None:
@@ -83,9 +83,9 @@ def test_the_driving_score_is_the_leaderboards() -> None:
 
 
 def test_kilometres_between_infractions_are_open_where_none_occurred() -> None:
-    found = {rate.kind: rate for rate in infraction_rates([driven(kinds=(InfractionKind.SIDEWALK,) * 2)] * 3)}
-    assert found[InfractionKind.SIDEWALK].km_between == "0.25"
-    assert found[InfractionKind.RED_LIGHT].km_between == "> 1.5"
+    rates = {rate.kind: rate for rate in infraction_rates([driven(kinds=(InfractionKind.SIDEWALK,) * 2)] * 3)}
+    assert rates[InfractionKind.SIDEWALK].km_between == "0.25"
+    assert rates[InfractionKind.RED_LIGHT].km_between == "> 1.5"
 
 
 def test_what_others_cause_does_not_count() -> None:
@@ -105,12 +105,12 @@ def test_comfort_weighs_each_episode_by_its_time() -> None:
                     comfortable=1.0)  # fmt: skip
     second = lasting(30.0, {}, center_distance=0.3, jerk=3.0, lateral_straight=2.0, lateral_turn=9.0, turning=0.0,
                      comfortable=0.5)  # fmt: skip
-    found = mean_comfort([first, second])
-    assert found["center_distance"] == pytest.approx(0.2)  # the median of two
-    assert found["jerk"] == pytest.approx(math.sqrt((10 * 1 + 30 * 9) / 40))
-    assert found["lateral_straight"] == pytest.approx(2.0)  # the first one only turned
-    assert found["lateral_turn"] == pytest.approx(3.0)  # the second one never did
-    assert found["comfortable"] == pytest.approx((10 + 15) / 40)
+    means = mean_comfort([first, second])
+    assert means["center_distance"] == pytest.approx(0.2)  # the median of two
+    assert means["jerk"] == pytest.approx(math.sqrt((10 * 1 + 30 * 9) / 40))
+    assert means["lateral_straight"] == pytest.approx(2.0)  # the first one only turned
+    assert means["lateral_turn"] == pytest.approx(3.0)  # the second one never did
+    assert means["comfortable"] == pytest.approx((10 + 15) / 40)
 
 
 def test_red_lights_are_those_stopped_for_and_those_run() -> None:

@@ -22,15 +22,15 @@ from tests.benchmark.traces import trace
 pytestmark = pytest.mark.usefixtures("fresh_worker")
 RED, CAR = InfractionKind.RED_LIGHT, InfractionKind.COLLISION_CAR
 BY = {"agent": "oracle", "cap": 20.0, "controller": "default", "code": "1", "model": None, "precision": None}
-SAID = {"suite": "x", "suite_content": None, "time_limit": "paper", "seed": 0, "model_file": None}
-RUN = BY | SAID | {"began": "2026-01-01T00:00:00", "machine": "a clock", "workers": 2}
+CONDITIONS = {"suite": "x", "suite_content": None, "time_limit": "paper", "seed": 0, "model_file": None}
+RUN = BY | CONDITIONS | {"began": "2026-01-01T00:00:00", "machine": "a clock", "workers": 2}
 
 
 def short_suite(path: Path, task: str, fatal: tuple[InfractionKind, ...] = ()) -> str:
     """Two trials of three seconds under a name."""
     trials = [
-        Trial(f"{task}-{k}", "training", replace(one.scenario, time_limit=3.0, task=task), fatal)
-        for k, one in enumerate(suite("quick")[6:8])
+        Trial(f"{task}-{k}", "training", replace(trial.scenario, time_limit=3.0, task=task), fatal)
+        for k, trial in enumerate(suite("quick")[6:8])
     ]
     path.write_text(to_json(trials))
     return str(path)
@@ -56,8 +56,12 @@ def test_what_is_taken_over_is_what_driving_gives(tmp_path: Path, monkeypatch: p
 
 def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[InfractionKind, ...]) -> Path:
     """A folder in which an episode ended so."""
-    broken = tuple(Infraction(kind, 1.0 + k, 0.0, 0.0) for k, kind in enumerate(kinds))
-    result = result_values(EpisodeResult(replace(trial.scenario, task="x"), outcome, 3.0, 1.0, 1.0, 9.0, broken, {}))
+    infractions = tuple(Infraction(kind, time=1.0 + k, x=0.0, y=0.0) for k, kind in enumerate(kinds))
+    episode = EpisodeResult(
+        scenario=replace(trial.scenario, task="x"), outcome=outcome, duration=3.0, distance=1.0, route_done=1.0,
+        route_length=9.0, infractions=infractions,
+    )  # fmt: skip
+    result = result_values(episode)
     line: dict[str, Any] = {"key": "x-0", "result": result, "figures": {}}
     (folder / "run.json").write_text(json.dumps(RUN))
     (folder / "results.jsonl").write_text(json.dumps(line) + "\n")
@@ -85,8 +89,8 @@ def test_an_episode_that_would_end_elsewhere_is_driven_again(
 ) -> None:
     trial = replace(suite("quick")[0], fatal=fatal)
     folder = known_folder(tmp_path, trial, outcome, kinds)
-    found = list(reusable_records([RunFolder(folder)], [trial], BY))
-    assert [one.line["key"] for one in found] == ([trial.key] if taken else [])
+    records = list(reusable_records([RunFolder(folder)], [trial], BY))
+    assert [record.line["key"] for record in records] == ([trial.key] if taken else [])
 
 
 def test_an_episode_without_its_trace_is_driven(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-from collections.abc import Generator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -31,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("fresh_worker")
 def settings(tmp_path_factory: pytest.TempPathFactory) -> BenchmarkSettings:
     """Four trials of three seconds, one of them among others."""
     folder = tmp_path_factory.mktemp("suite")
-    trials = [replace(one, scenario=replace(one.scenario, time_limit=3.0)) for one in suite("quick")[4:8]]
+    trials = [replace(trial, scenario=replace(trial.scenario, time_limit=3.0)) for trial in suite("quick")[4:8]]
     (folder / "short.json").write_text(to_json(trials))
     return BenchmarkSettings(suite=str(folder / "short.json"), agent="oracle", out=folder / "whole", workers=1)
 
@@ -47,18 +46,17 @@ def lines(settings: BenchmarkSettings) -> list[bytes]:
 
 
 def test_a_run_broken_off_goes_on_to_the_same_results(whole: BenchmarkSettings, tmp_path: Path) -> None:
-    broken = replace(whole, out=tmp_path)
-    run = benchmark(broken)
-    assert isinstance(run, Generator)
+    resumed = replace(whole, out=tmp_path)
+    run = benchmark(resumed)
     next(run)
-    run.close()
+    run.close()  # type: ignore[attr-defined]
     with (tmp_path / "results.jsonl").open("ab") as file:  # as if killed while writing
         file.write(b'{"key": "tow')
     assert len(read_lines(tmp_path)) == 1
-    assert [step.done for step in benchmark(broken)] == [2, 3, 4]
-    assert lines(broken) == lines(whole)
-    assert RunFolder(broken.out).results() == RunFolder(whole.out).results()
-    assert list(benchmark(broken)) == []
+    assert [step.done for step in benchmark(resumed)] == [2, 3, 4]
+    assert lines(resumed) == lines(whole)
+    assert RunFolder(resumed.out).results() == RunFolder(whole.out).results()
+    assert list(benchmark(resumed)) == []
 
 
 def test_two_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Path) -> None:
@@ -72,15 +70,15 @@ def test_rays_workers_find_what_one_finds(whole: BenchmarkSettings, tmp_path: Pa
     ray = replace(whole, out=tmp_path, workers=2, ray="local")
     list(benchmark(ray))
     assert lines(ray) == lines(whole)
-    files = [sorted(path.name for path in (one.out / "traces").iterdir()) for one in (ray, whole)]
+    files = [sorted(path.name for path in (run.out / "traces").iterdir()) for run in (ray, whole)]
     assert files[0] == files[1]
 
 
 def test_results_stand_in_the_suites_order(whole: BenchmarkSettings) -> None:
-    found = RunFolder(whole.out).results()
-    assert [one.trial for one in found] == suite(whole.suite)
-    assert all(one.episode.duration == pytest.approx(3.0, abs=0.11) for one in found)
-    assert all(one.metrics["error/center_distance"] == 0 for one in found)  # the oracle's
+    results = RunFolder(whole.out).results()
+    assert [result.trial for result in results] == suite(whole.suite)
+    assert all(result.episode.duration == pytest.approx(3.0, abs=0.11) for result in results)
+    assert all(result.metrics["error/center_distance"] == 0 for result in results)  # the oracle's
 
 
 @pytest.mark.parametrize("change", [{"signs": True}, {"cap": 30.0}, {"controller": "paper"}])
@@ -97,9 +95,9 @@ def test_another_version_of_the_code_is_another_run(whole: BenchmarkSettings, mo
 
 def test_an_episode_driven_again_goes_as_before(whole: BenchmarkSettings, tmp_path: Path) -> None:
     (trial, *_) = suite(whole.suite)
-    found = replay(whole.out, trial.key, tmp_path / "again.mp4")
-    assert found.same
-    assert found.video.stat().st_size > 1000
+    again = replay(whole.out, trial.key, tmp_path / "again.mp4")
+    assert again.same
+    assert again.video.stat().st_size > 1000
     with pytest.raises(ValueError, match="found no episode 'x'"):
         replay(whole.out, "x", tmp_path / "other.mp4")
 
@@ -116,7 +114,7 @@ def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"weather": 99}, "found weather 99"),
         ({"town": "town09"}, "found town 'town09'"),
@@ -126,12 +124,12 @@ def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> No
     ],
 )
 def test_a_trial_that_cannot_be_is_named_before_there_is_a_folder(
-    change: dict[str, Any], said: str, whole: BenchmarkSettings, tmp_path: Path
+    change: dict[str, Any], message: str, whole: BenchmarkSettings, tmp_path: Path
 ) -> None:
     first, last = suite(whole.suite)[:2]
     trials = [first, replace(last, scenario=replace(last.scenario, **change))]
     (tmp_path / "own.json").write_text(to_json(trials))
-    with pytest.raises(ValueError, match=f"{last.key} in .* cannot be driven .{said}"):
+    with pytest.raises(ValueError, match=f"{last.key} in .* cannot be driven .{message}"):
         next(benchmark(replace(whole, suite=str(tmp_path / "own.json"), out=tmp_path / "out")))
     assert not (tmp_path / "out").exists()
 
@@ -235,10 +233,10 @@ def test_a_damaged_trace_is_named(content: bytes, tmp_path: Path) -> None:
 
 
 def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:
-    found = json.loads((whole.out / "run.json").read_text())
-    assert found["agent"] == "oracle"
-    assert found["cap"] == 20.0
-    assert found["code"] == code_version()
+    description = json.loads((whole.out / "run.json").read_text())
+    assert description["agent"] == "oracle"
+    assert description["cap"] == 20.0
+    assert description["code"] == code_version()
 
 
 @pytest.fixture

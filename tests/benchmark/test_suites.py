@@ -15,47 +15,49 @@ from caldrive.results import InfractionKind
 def test_corl2017_has_25_routes_of_each_task_in_each_weather_of_each_condition() -> None:
     trials = suite("corl2017")
     assert len(trials) == 1200
-    assert len({one.key for one in trials}) == 1200
-    counts = Counter((one.condition, one.scenario.task) for one in trials)
+    assert len({trial.key for trial in trials}) == 1200
+    counts = Counter((trial.condition, trial.scenario.task) for trial in trials)
     assert len(counts) == 16
     assert {n for (condition, _), n in counts.items() if "weather" in condition} == {50}
     assert {n for (condition, _), n in counts.items() if "weather" not in condition} == {100}
-    weathers = {(one.scenario.town, one.scenario.weather) for one in trials if one.condition == "new town + weather"}
+    weathers = {
+        (trial.scenario.town, trial.scenario.weather) for trial in trials if trial.condition == "new town + weather"
+    }
     assert weathers == {("town02", 4), ("town02", 14)}
 
 
 def test_no_episode_is_another_one_under_another_sky() -> None:
     for name, count in (("corl2017", 1200), ("nocrash", 900)):
-        both = [replace(one.scenario, weather=1, task="") for seed in (0, 1) for one in suite(name, seed)]
+        both = [replace(trial.scenario, weather=1, task="") for seed in (0, 1) for trial in suite(name, seed)]
         assert len(set(both)) == 2 * count
 
 
 def test_nocrash_shares_its_empty_and_regular_towns_with_the_papers_navigation() -> None:
-    known = {replace(one.scenario, task="") for one in suite("corl2017")}
-    shared = Counter(one.scenario.task for one in suite("nocrash") if replace(one.scenario, task="") in known)
+    known = {replace(trial.scenario, task="") for trial in suite("corl2017")}
+    shared = Counter(trial.scenario.task for trial in suite("nocrash") if replace(trial.scenario, task="") in known)
     assert shared == {"empty": 300, "regular": 300}
 
 
 def test_its_first_third_has_seen_every_cell() -> None:
-    assert len({(one.condition, one.scenario.task) for one in suite("corl2017")[:400]}) == 16
+    assert len({(trial.condition, trial.scenario.task) for trial in suite("corl2017")[:400]}) == 16
 
 
 def test_corl2017_once_has_each_of_its_routes_in_one_weather_and_all_cells_from_the_start() -> None:
     trials, whole = suite("corl2017-once"), suite("corl2017")
-    assert {one.key for one in trials} <= {one.key for one in whole}
-    routes = Counter((one.condition, one.scenario.task, one.key[-2:]) for one in trials)
+    assert {trial.key for trial in trials} <= {trial.key for trial in whole}
+    routes = Counter((trial.condition, trial.scenario.task, trial.key[-2:]) for trial in trials)
     assert len(routes) == 400
     assert set(routes.values()) == {1}
-    assert len({(one.condition, one.scenario.task) for one in trials[:16]}) == 16
-    weathers = Counter(one.scenario.weather for one in trials if one.condition == "new town")
+    assert len({(trial.condition, trial.scenario.task) for trial in trials[:16]}) == 16
+    weathers = Counter(trial.scenario.weather for trial in trials if trial.condition == "new town")
     assert set(weathers) == {1, 3, 6, 8}
     assert set(weathers.values()) <= {24, 28}
 
 
 def test_only_the_dynamic_task_has_others_on_the_road() -> None:
     traffic = {
-        (one.scenario.town, one.scenario.task): (one.scenario.n_vehicles, one.scenario.n_pedestrians)
-        for one in suite("corl2017")
+        (trial.scenario.town, trial.scenario.task): (trial.scenario.n_vehicles, trial.scenario.n_pedestrians)
+        for trial in suite("corl2017")
     }
     assert traffic["town01", "navigation-dynamic"] == (20, 50)
     assert traffic["town02", "navigation-dynamic"] == (15, 50)
@@ -67,8 +69,8 @@ def test_nocrash_ends_at_collisions_and_traffic_school_at_every_offence(
     name: str, fatal: tuple[InfractionKind, ...]
 ) -> None:
     trials = suite(name)
-    assert {one.fatal for one in trials} == {fatal}
-    dense = {(s.town, s.n_vehicles, s.n_pedestrians) for s in (one.scenario for one in trials) if s.task == "dense"}
+    assert {trial.fatal for trial in trials} == {fatal}
+    dense = {(s.town, s.n_vehicles, s.n_pedestrians) for s in (trial.scenario for trial in trials) if s.task == "dense"}
     assert dense == {("town01", 100, 250), ("town02", 70, 150)}
 
 

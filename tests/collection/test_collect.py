@@ -16,6 +16,7 @@ from caldrive.collection import collect as collection
 from caldrive.collection.collect import _record, collect
 from caldrive.collection.config import CollectConfig
 from caldrive.datatypes import Control
+from caldrive.files import locked_folder
 from caldrive.world.embedded import EmbeddedWorld
 
 TINY = CollectConfig(
@@ -83,6 +84,11 @@ def test_a_recording_killed_within_an_episode_leaves_no_half_file(
     assert contents(tmp_path) == contents(unbroken)
 
 
+def test_two_recordings_in_one_folder_at_once_are_refused(tmp_path: Path) -> None:
+    with locked_folder(tmp_path), pytest.raises(ValueError, match="found another process at work"):
+        next(collect(TINY, tmp_path))
+
+
 def test_a_finished_recording_has_nothing_left_to_do(unbroken: Path) -> None:
     before = contents(unbroken)
     assert list(collect(TINY, unbroken)) == []
@@ -97,7 +103,7 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"town": "town09"}, "found town 'town09'"),
         ({"weathers": (1, 15)}, "found weather 15"),
@@ -111,9 +117,9 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
     ],
 )
 def test_what_cannot_be_recorded_is_said_before_anything_is_written(
-    tmp_path: Path, change: dict[str, Any], said: str
+    tmp_path: Path, change: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=message):
         next(collect(replace(TINY, **change), tmp_path / "new"))
     assert not (tmp_path / "new").exists()
 

@@ -1,4 +1,4 @@
-"""Of a drive those moments become key frames that tell something new."""
+"""Of a drive those steps become key frames that show something new."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ from caldrive.datatypes import Affordances
 STREET = Affordances()
 
 
-def taken(
+def selected(
     wanted: int, tailgating: bool = False, speed: Callable[[int], float] = lambda k: 0.0,
     labels: Callable[[int], Affordances] = lambda k: STREET,
 ) -> list[int]:  # fmt: skip
-    """The key frames among as many moments as a drive may last, until there are enough."""
-    frames, found = KeyFrameSelector(wanted, tailgating), list[int]()
-    for k in range(frames.max_steps):
-        if frames.select(labels(k), speed(k)):
-            found.append(k)
-        if frames.selected == wanted:
+    """The key frames among as many steps as a drive may last, until there are enough."""
+    selector, key_frames = KeyFrameSelector(wanted, tailgating), list[int]()
+    for k in range(selector.max_steps):
+        if selector.select(labels(k), speed(k)):
+            key_frames.append(k)
+        if selector.selected == wanted:
             break
-    return found
+    return key_frames
 
 
-def test_moments_in_which_the_car_stands_for_long_tell_little() -> None:
-    found = taken(200, speed=lambda k: 5.0 if k > 200 else 0.0)
-    standing = [k for k in found if k <= 200]
+def test_steps_in_which_the_car_stands_for_long_show_little() -> None:
+    key_frames = selected(200, speed=lambda k: 5.0 if k > 200 else 0.0)
+    standing = [k for k in key_frames if k <= 200]
     assert standing == [*range(15), *range(134, 143)]
-    assert found[len(standing) :] == list(range(201, 401 - len(standing)))  # twenty seconds that tell something
+    assert key_frames[len(standing) :] == list(range(201, 401 - len(standing)))  # twenty seconds that show something
 
 
-def test_a_light_that_changes_before_a_standing_car_tells_something() -> None:
-    found = taken(100, labels=lambda k: Affordances(red_light=float(0 < k <= 60)))
-    assert found == [*range(17), *range(61, 77), *range(196, 200)]
+def test_a_light_that_changes_before_a_standing_car_shows_something() -> None:
+    key_frames = selected(100, labels=lambda k: Affordances(red_light=float(0 < k <= 60)))
+    assert key_frames == [*range(17), *range(61, 77), *range(196, 200)]
 
 
-def test_a_tailgater_tells_of_the_beginning_and_of_the_cars_met() -> None:
-    found = taken(
+def test_a_tailgating_drive_keeps_its_first_steps_and_the_cars_met() -> None:
+    key_frames = selected(
         50,
         tailgating=True,
         speed=lambda k: 5.0,
         labels=lambda k: Affordances(vehicle_distance=20.0 if 100 < k <= 110 else 40.0),
     )
-    assert found == [*range(8), *range(101, 111)]
+    assert key_frames == [*range(8), *range(101, 111)]
 
 
 def test_an_episode_in_which_the_car_stands_on_ends() -> None:

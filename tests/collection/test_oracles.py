@@ -1,4 +1,4 @@
-"""Recorders' drivers who are told something else than the truth."""
+"""Oracles that report something else than the truth, so that the driver comes close to cars."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def nearest(world: StraightRoad, perception: OraclePerception, seconds: float = 
 
 
 @pytest.mark.parametrize("gap", [0.5, 1.5, 3.0, 4.0])
-def test_a_tailgater_stops_at_his_gap_and_hits_nobody(gap: float) -> None:
+def test_a_tailgating_driver_stops_at_its_gap_and_hits_nobody(gap: float) -> None:
     world = road(lead=lambda time: 80.0)
     assert 0.3 * gap < nearest(world, TailgatingOracle(world.truth, gap)) < gap + 0.8
 
@@ -48,7 +48,7 @@ def test_others_stop_farther_away() -> None:
 
 
 def stopping_place(world: StraightRoad, seconds: float) -> float:
-    """Where the front axle of a tailgater stands in the end, as an arc length in m."""
+    """Where the front axle of a tailgating driver stands in the end, as an arc length in m."""
     agent = CALAgent(TailgatingOracle(world.truth, 1.0), CALController(PATIENT))
     observation = world.reset(AWAY)
     for _ in range(round(seconds / world.dt)):
@@ -57,11 +57,11 @@ def stopping_place(world: StraightRoad, seconds: float) -> float:
     return world.along
 
 
-def test_a_tailgater_stops_for_people() -> None:
+def test_a_tailgating_driver_stops_for_people() -> None:
     assert stopping_place(road(person=lambda time: (50.0, 0.0)), 15.0) < 49.0
 
 
-def test_a_tailgater_waits_for_people_who_walk_between_him_and_a_car_that_drives_off() -> None:
+def test_a_tailgating_driver_waits_for_people_who_walk_between_it_and_a_car_that_drives_off() -> None:
     def lead(time: float) -> float:
         return 51.5 + 3.0 * max(0.0, time - 22.0)
 
@@ -71,9 +71,9 @@ def test_a_tailgater_waits_for_people_who_walk_between_him_and_a_car_that_drives
 
 
 @pytest.mark.parametrize("kind", [HiddenCarsOracle, lambda truth: TailgatingOracle(truth, 1.0)])
-def test_on_an_empty_road_all_are_told_the_truth(kind: Callable[..., OraclePerception]) -> None:
+def test_on_an_empty_road_all_report_the_truth(kind: Callable[..., OraclePerception]) -> None:
     world = road(light=5.0)
     observation = world.reset(AWAY)
-    told = kind(world.truth).predict(observation)
-    assert told == world.truth().affordances
-    assert told.vehicle_distance == MAX_VEHICLE_DISTANCE
+    reported = kind(world.truth).predict(observation)
+    assert reported == world.truth().affordances
+    assert reported.vehicle_distance == MAX_VEHICLE_DISTANCE

@@ -111,17 +111,17 @@ def test_weathers_take_turns(recorded: list[Episode]) -> None:
 
 
 def test_episodes_differ_in_start_and_seed(recorded: list[Episode]) -> None:
-    found = [episode.scenario for episode in recorded]
-    assert len({one.seed for one in found}) == len({one.start for one in found}) == 3
+    scenarios = [episode.scenario for episode in recorded]
+    assert len({scenario.seed for scenario in scenarios}) == len({scenario.start for scenario in scenarios}) == 3
 
 
 def test_semantic_images_are_recorded_where_they_are_asked_for(
     world: EmbeddedWorld, episode: Episode, tmp_path: Path
 ) -> None:
-    found = recording(world, replace(TINY, semantic=True), tmp_path, semantic=True)
-    assert found.semantic(5).shape == found.image(5).shape[:2]
-    assert Semantic.ROAD in found.semantic(5)
-    assert found.jpegs == episode.jpegs
+    with_semantics = recording(world, replace(TINY, semantic=True), tmp_path, semantic=True)
+    assert with_semantics.semantic(5).shape == with_semantics.image(5).shape[:2]
+    assert Semantic.ROAD in with_semantics.semantic(5)
+    assert with_semantics.jpegs == episode.jpegs
     assert read_episode(episode_path(tmp_path, 0)).semantics is None
     with pytest.raises(EpisodeError, match="record with --semantic"):
         episode.semantic(5)

@@ -21,8 +21,7 @@ from caldrive.cli import _print, main
 from caldrive.commands.answer import Answer
 from caldrive.datatypes import Command, Observation
 from caldrive.driving.determinism import EpisodeDigests, compare
-from caldrive.perception.network.config import BlockConfig, PerceptionConfig
-from caldrive.perception.training.config import TRAININGS, TrainingConfig
+from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.timing import Stopwatch
 from caldrive.visualization.hud import SIZE
 
@@ -48,7 +47,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> str:
     from caldrive.perception.network.network import Network
 
     torch.manual_seed(0)
-    config = PerceptionConfig(64, 32, 0.0625, vehicle_distance=BlockConfig("gru", 8, 0.0, length=3))
+    config = NetworkConfig(64, 32, 0.0625, vehicle_distance=BlockConfig("gru", 8, 0.0, length=3))
     path = tmp_path_factory.mktemp("model") / "random.safetensors"
     save_network(path, Network(config), CheckpointInfo(config))
     return str(path)
@@ -171,24 +170,6 @@ def test_two_fresh_processes_drive_the_same_bytes() -> None:
     assert found["steps"] == 11
 
 
-def test_a_comparison_names_the_first_step_and_part_that_differ() -> None:
-    steps = tuple(("image", "truth", "decision", f"control{i}") for i in range(5))
-    other = (*steps[:3], ("image", "truth", "decision", "another"), steps[4])
-    assert compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps, "r")).equal
-    assert (
-        compare(EpisodeDigests(steps, "r"), EpisodeDigests(other, "r")).difference
-        == "step 3 (0.3 s) differs in its control"
-    )
-    assert (
-        compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps[:4], "r")).difference
-        == "one run ends after 4 steps, the other goes on"
-    )
-    assert (
-        compare(EpisodeDigests(steps, "r"), EpisodeDigests(steps, "q")).difference
-        == "the results differ, though no step does"
-    )
-
-
 def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     different = compare(EpisodeDigests((("a",) * 4,), "r"), EpisodeDigests((("b",) * 4,), "r"))
     monkeypatch.setattr("caldrive.driving.determinism.check_determinism", lambda *_: different)
@@ -204,51 +185,3 @@ def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert all(verb in shown for verb in ("drive", "see", "town", "speed", "determinism"))
     assert shown.splitlines()[-1].strip() == "loaded"
-
-
-def test_what_is_collected_can_be_trained_on_and_the_result_drives(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    small = TrainingConfig(steps=2, batch=2, window=3, block_steps=3, block_batch=8, save_every=1)
-    monkeypatch.setitem(TRAININGS, "small", small)
-    recording, training = tmp_path / "recording", tmp_path / "training"
-    found = run_json(
-        *("collect", "--out", str(recording), "--episodes", "2", "--duration", "1", "--workers", "1"),
-    )
-    assert sum(found["counts"]["hazard_stop"].values()) == 2 * 10 * 3  # episodes, moments, cameras
-    model = run_json("train", "--data", str(recording), "--out", str(training))["model"]
-    seen = run_json("evaluate", "--data", str(recording), "--model", model, "--held-out")
-    assert 0 < seen["frames"] <= 10 * 3  # one of the two episodes
-    assert 0 <= seen["overall"]["red_light/iou"] <= 1
-    checked = run_json("data", str(recording), "--picture", str(tmp_path / "labels.png"))
-    assert (checked["episodes"], checked["damaged"]) == (2, [])
-    driven = run_json(*DRIVE, "--model", model, "--seconds", "1", "--no-video", "--out", str(tmp_path / "drive"))
-    assert driven["episodes"][0]["duration"] == pytest.approx(1.0)
-
-
-def test_a_training_says_which_blocks_begin_anew(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    from caldrive.commands.train import Train
-    from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
-    from caldrive.perception.network.network import Network
-
-    usual = PerceptionConfig()
-    other = replace(usual, hazard_stop=replace(usual.hazard_stop, dilation=5))
-    save_network(tmp_path / "other.safetensors", Network(other), CheckpointInfo(other))
-    assert Train(initial=tmp_path / "other.safetensors", out=tmp_path)._began_anew() == ["hazard_stop"]
-    (tmp_path / "state.safetensors").touch()
-    assert Train(initial=tmp_path / "gone.safetensors", out=tmp_path)._began_anew() == []
-
-
-def test_imagenets_weights_are_asked_for_by_a_training_that_begins_and_not_by_one_that_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("TORCH_HOME", str(tmp_path / "hub"))
-    train = ["train", "--preset", "paper", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "out")]
-    assert main(train) == 2
-    assert "found no vgg16-*.pth" in capsys.readouterr().err
-    (tmp_path / "out").mkdir(exist_ok=True)
-    (tmp_path / "out" / "state.safetensors").touch()
-    assert main(train) == 2
-    assert "there is no episode" in capsys.readouterr().err

@@ -14,33 +14,38 @@ TIME = np.arange(0, 20, DT)
 
 
 def test_a_steady_drive_straight_on_is_perfectly_smooth() -> None:
-    found = motion(np.full(200, 8.0), np.zeros(200), DT)
-    assert found["jerk"] == pytest.approx(0, abs=1e-9)
-    assert (found["turning"], found["lateral_straight"], found["comfortable"]) == (0.0, pytest.approx(0), 1.0)
+    metrics = motion(np.full(200, 8.0), np.zeros(200), DT)
+    assert metrics["jerk"] == pytest.approx(0, abs=1e-9)
+    assert metrics["lateral_straight"] == pytest.approx(0, abs=1e-9)
+    assert (metrics["turning"], metrics["comfortable"]) == (0.0, 1.0)
 
 
 def test_even_acceleration_has_no_jerk() -> None:
-    found = motion(1.5 * TIME, np.zeros(200), DT)
-    assert found["jerk"] == pytest.approx(0, abs=1e-9)
-    assert found["comfortable"] == 1.0
+    metrics = motion(1.5 * TIME, np.zeros(200), DT)
+    assert metrics["jerk"] == pytest.approx(0, abs=1e-9)
+    assert metrics["comfortable"] == 1.0
 
 
 def test_a_swinging_speed_has_the_jerk_of_its_second_derivative() -> None:
-    found = motion(10 + np.sin(0.5 * TIME), np.zeros(200), DT)
-    assert found["jerk"] == pytest.approx(0.25 / math.sqrt(2), rel=0.05)
+    metrics = motion(10 + np.sin(0.5 * TIME), np.zeros(200), DT)
+    assert metrics["jerk"] == pytest.approx(0.25 / math.sqrt(2), rel=0.05)
 
 
 def test_a_steady_turn_counts_as_turning_without_lateral_jerk() -> None:
-    found = motion(np.full(200, 5.0), 0.3 * TIME, DT)
-    assert found["turning"] == pytest.approx(20.0)
-    assert found["lateral_turn"] == pytest.approx(0, abs=1e-9)
+    metrics = motion(np.full(200, 5.0), 0.3 * TIME, DT)
+    assert metrics["turning"] == pytest.approx(20.0)
+    assert metrics["lateral_turn"] == pytest.approx(0, abs=1e-9)
 
 
 def test_a_swinging_wheel_has_the_lateral_jerk_of_its_yaw_acceleration() -> None:
     heading = 0.2 * np.sin(TIME)  # yaw rate 0.2 cos, lateral jerk 5 m/s times -0.2 sin
-    found = motion(np.full(200, 5.0), heading, DT)
+    metrics = motion(np.full(200, 5.0), heading, DT)
     both = math.sqrt(
-        (found["turning"] * found["lateral_turn"] ** 2 + (20 - found["turning"]) * found["lateral_straight"] ** 2) / 20
+        (
+            metrics["turning"] * metrics["lateral_turn"] ** 2
+            + (20 - metrics["turning"]) * metrics["lateral_straight"] ** 2
+        )
+        / 20
     )
     assert both == pytest.approx(1.0 / math.sqrt(2), rel=0.06)
 
@@ -56,7 +61,7 @@ def test_an_episode_of_a_moment_has_figures_too() -> None:
 
 def test_an_episodes_figures_hold_its_median_distance_to_the_centre_line() -> None:
     times = [0.1 * i for i in range(50)]
-    figures = comfort(times, [t * t for t in times], [0.0] * 50, [-0.4, 0.1, 0.2])
-    assert figures["center_distance"] == pytest.approx(0.2)
-    assert figures["jerk"] == pytest.approx(2.0)
+    metrics = comfort(times, [t * t for t in times], [0.0] * 50, [-0.4, 0.1, 0.2])
+    assert metrics["center_distance"] == pytest.approx(0.2)
+    assert metrics["jerk"] == pytest.approx(2.0)
     assert comfort([], [], [], [])["center_distance"] == 0.0

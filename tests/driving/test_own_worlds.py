@@ -62,4 +62,4 @@ def test_what_is_no_world_or_no_place_is_named(
 ) -> None:
     (tmp_path / "own.py").write_text("class Half:\n    dt = 0.1\n    def reset(self, scenario): pass\n")
     command = ["drive", "--agent", "oracle", "--out", str(tmp_path / "out"), *arguments]
-    assert message in refusal(capsys, *(one.replace("{tmp}", str(tmp_path)) for one in command))
+    assert message in refusal(capsys, *(word.replace("{tmp}", str(tmp_path)) for word in command))

@@ -74,7 +74,7 @@ def test_others_faults_hide_none_of_ones_own(
 ) -> None:
     theirs, own = ((Contact(contact, "it", threshold + 1, at_fault=fault),) for fault in (False, True))
     seen = watched([frame(0, contacts=theirs), frame(1, contacts=own), frame(2, contacts=theirs)])
-    assert [one.at_fault for one in seen.infractions] == [False, True]
+    assert [infraction.at_fault for infraction in seen.infractions] == [False, True]
 
 
 @pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
@@ -160,9 +160,9 @@ def test_time_is_up_at_the_limit_and_the_goal_goes_first() -> None:
 def test_a_fatal_infraction_ends_the_episode_even_at_the_goal() -> None:
     frames = [frame(i, lights=light(LightState.RED), goal_distance=50.0 - i) for i in range(60)]
     strict, lax = Referee(SCENARIO, fatal=(InfractionKind.RED_LIGHT,)), Referee(SCENARIO)
-    assert next(outcome for one in frames if (outcome := strict.watch(one))) is Outcome.FAILED
-    assert next(outcome for one in frames if (outcome := lax.watch(one))) is Outcome.SUCCESS
-    assert [one.kind for one in lax.infractions] == [InfractionKind.RED_LIGHT]
+    assert next(outcome for frame in frames if (outcome := strict.watch(frame))) is Outcome.FAILED
+    assert next(outcome for frame in frames if (outcome := lax.watch(frame))) is Outcome.SUCCESS
+    assert [infraction.kind for infraction in lax.infractions] == [InfractionKind.RED_LIGHT]
 
 
 def test_result_sums_up_the_drive() -> None:

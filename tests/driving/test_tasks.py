@@ -43,9 +43,9 @@ def test_straight_routes_neither_turn_nor_bend(town: str) -> None:
 
 @pytest.mark.parametrize("town", TOWNS)
 def test_one_turn_routes_turn_once_and_to_both_sides(town: str) -> None:
-    found = [turns(route) for route in planned(town, "one-turn")]
-    assert {len(commands) for commands in found} == {1}
-    assert {commands[0] for commands in found} == {Command.LEFT, Command.RIGHT}
+    commands = [turns(route) for route in planned(town, "one-turn")]
+    assert {len(of_route) for of_route in commands} == {1}
+    assert {of_route[0] for of_route in commands} == {Command.LEFT, Command.RIGHT}
 
 
 @pytest.mark.parametrize("town", TOWNS)
@@ -81,28 +81,31 @@ def test_the_routes_do_not_depend_on_the_seed() -> None:
 def test_only_the_dynamic_task_has_others_on_the_road(town: str, others: tuple[int, int]) -> None:
     for task in TASKS:
         wanted = others if task == "navigation-dynamic" else (0, 0)
-        assert {(one.n_vehicles, one.n_pedestrians) for one in task_scenarios(town, task)} == {wanted}
+        assert {(scenario.n_vehicles, scenario.n_pedestrians) for scenario in task_scenarios(town, task)} == {wanted}
 
 
 def test_others_can_be_asked_for_and_left_out() -> None:
     assert {
-        (one.n_vehicles, one.n_pedestrians) for one in task_scenarios("town02", "straight", cars=70, people=150)
+        (scenario.n_vehicles, scenario.n_pedestrians)
+        for scenario in task_scenarios("town02", "straight", cars=70, people=150)
     } == {(70, 150)}
-    assert {one.n_vehicles for one in task_scenarios("town02", "navigation-dynamic", cars=0)} == {0}
+    assert {scenario.n_vehicles for scenario in task_scenarios("town02", "navigation-dynamic", cars=0)} == {0}
 
 
 def test_scenarios_carry_task_weather_and_their_own_seed() -> None:
-    found = task_scenarios("town02", "one-turn", 14, seed=3)
-    assert {(one.town, one.task, one.weather) for one in found} == {("town02", "one-turn", 14)}
-    assert len({one.seed for one in found}) == 25
-    assert {one.seed for one in found}.isdisjoint(one.seed for one in task_scenarios("town02", "one-turn", 14, seed=4))
+    one_turn = task_scenarios("town02", "one-turn", 14, seed=3)
+    assert {(scenario.town, scenario.task, scenario.weather) for scenario in one_turn} == {("town02", "one-turn", 14)}
+    assert len({scenario.seed for scenario in one_turn}) == 25
+    assert {scenario.seed for scenario in one_turn}.isdisjoint(
+        scenario.seed for scenario in task_scenarios("town02", "one-turn", 14, seed=4)
+    )
 
 
 def test_the_time_limit_is_that_of_the_paper_or_that_of_its_code() -> None:
     lengths = [route.length for route in planned("town02", "straight")]
     paper, code = (task_scenarios("town02", "straight", time_limit=limit) for limit in ("paper", "code"))
-    assert [one.time_limit for one in paper] == pytest.approx([length * 0.36 for length in lengths])
-    assert [one.time_limit for one in code] == pytest.approx([length * 0.72 + 10 for length in lengths])
+    assert [scenario.time_limit for scenario in paper] == pytest.approx([length * 0.36 for length in lengths])
+    assert [scenario.time_limit for scenario in code] == pytest.approx([length * 0.72 + 10 for length in lengths])
 
 
 def test_an_unknown_task_names_the_known_ones() -> None:
@@ -127,7 +130,7 @@ def test_routes_drawn_anew_fit_their_task_and_follow_the_seed(task: str, town02:
 def test_a_map_too_small_for_a_task_says_so(town02: RoadNetwork) -> None:
     from dataclasses import replace
 
-    (lane,) = [one for one in town02.driveable if one.line.length > 60][:1]
+    (lane,) = [lane for lane in town02.driveable if lane.line.length > 60][:1]
     small = replace(town02, lanes={lane.id: replace(lane, successors=())})
     with pytest.raises(ValueError, match="found 0 routes for navigation in town02, wanted 3: give a larger map"):
         draw_routes(small, "navigation", 3, np.random.default_rng(0))

@@ -30,8 +30,8 @@ def _dies_at_first(folder: Path, k: int) -> int:
 
 @needs_ray
 def test_all_work_is_done_once_though_a_worker_dies(tmp_path: Path) -> None:
-    found = sorted(cluster_map(partial(_dies_at_first, tmp_path), range(5), 2, "local"))
-    assert found == [(k, k * k) for k in range(5)]
+    results = sorted(cluster_map(partial(_dies_at_first, tmp_path), range(5), 2, "local"))
+    assert results == [(k, k * k) for k in range(5)]
     assert [path.name for path in tmp_path.iterdir()] == ["died-1"]
 
 

@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from caldrive.affordances import SPECS
 from caldrive.datatypes import Affordances, Alternative, Command, Control, Image, Observation, Pose
-from caldrive.perception.network.config import BlockConfig, PerceptionConfig
+from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.recordings.writer import EpisodeWriter, Frame
 from caldrive.scenarios import Scenario
 
 HEIGHT, WIDTH = 32, 64
 SCENARIO = Scenario("town01", weather=1, start=Pose(0, 0, 0), goal=Pose(1, 2, 3), seed=7)
-TINY = PerceptionConfig(
+TINY = NetworkConfig(
     image_width=WIDTH,
     image_height=HEIGHT,
     width=1 / 8,
@@ -27,10 +28,10 @@ TINY = PerceptionConfig(
     center_distance=BlockConfig("dense", 8, 0.0),
 )
 SHORT = TrainingConfig(
-    steps=6, batch=4, window=3, warm_up=2, block_steps=0, evaluate_every=100, save_every=2, precision="fp32",
+    steps=6, batch=4, window=3, warm_up=2, history_steps=0, evaluate_every=100, save_every=2, precision="fp32",
     validation_share=0.3,
 )  # fmt: skip
-BLOCKS = replace(SHORT, block_steps=5, block_batch=8)
+HISTORY = replace(SHORT, history_steps=5, history_batch=8)  # with a second stage
 
 
 def column_image(center_distance: float, red: bool = False) -> Image:
@@ -44,15 +45,29 @@ def column_image(center_distance: float, red: bool = False) -> Image:
 
 
 def make_frame(index: int, center_distance: float = 0.0, hazard: bool = False, camera: int = 0) -> Frame:
-    labels = Affordances(float(hazard), 0.0, 30 if hazard else None, 20.0, 0.1, center_distance)
-    image = column_image(center_distance, hazard)
+    """A frame of a drive whose command changes every four frames, with a junction in one frame of eight."""
     command = (Command.LEFT, Command.STRAIGHT, Command.RIGHT)[index // 4 % 3]
-    clean, driven = Control(0.5, 0.0, 0.1), Control(0.5, 0.0, -0.2)
-    inside = index % 8 == 7
-    other = Alternative(Command.LEFT, 0.3, center_distance) if command is Command.RIGHT else None
     return Frame(
-        index, index / 10, 5.0, command, labels, driven, clean, image, camera, camera / 2, 0.1, None, inside, other
-    )  # fmt: skip
+        index=index,
+        time=index / 10,
+        speed=5.0,
+        command=command,
+        affordances=Affordances(
+            hazard_stop=float(hazard),
+            speed_sign=30 if hazard else None,
+            vehicle_distance=20.0,
+            relative_angle=0.1,
+            center_distance=center_distance,
+        ),
+        driven=Control(0.5, 0.0, -0.2),
+        clean=Control(0.5, 0.0, 0.1),
+        image=column_image(center_distance, hazard),
+        camera=camera,
+        camera_left=camera / 2,
+        camera_yaw=0.1,
+        junction=index % 8 == 7,
+        other=Alternative(Command.LEFT, 0.3, center_distance) if command is Command.RIGHT else None,
+    )
 
 
 def record(
@@ -70,8 +85,8 @@ def record(
             for index in range(n_frames):
                 for camera in range(n_cameras):
                     frame = make_frame(index, float(rng.uniform(-1, 1)), bool(rng.random() < 0.15), camera)
-                    seen = classes.integers(0, 8, (HEIGHT, WIDTH), dtype=np.uint8) if semantic else None
-                    writer.append(replace(frame, semantic=seen))
+                    semantics = classes.integers(0, 8, (HEIGHT, WIDTH), dtype=np.uint8) if semantic else None
+                    writer.append(replace(frame, semantic=semantics))
     return folder
 
 
@@ -82,12 +97,5 @@ def see(image: Image, index: int = 0) -> Observation:
 
 
 def values(a: Affordances) -> list[float]:
-    """All six as numbers."""
-    return [
-        a.hazard_stop,
-        a.red_light,
-        float(a.speed_sign or 0),
-        a.vehicle_distance,
-        a.relative_angle,
-        a.center_distance,
-    ]
+    """All of them as numbers."""
+    return [float(getattr(a, spec.name) or 0) for spec in SPECS]

@@ -10,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from caldrive.affordances import SPECS
+from caldrive.affordances import CONDITIONAL, CONTINUOUS, DISCRETE, SPECS
 from caldrive.datatypes import Affordances
 from caldrive.perception.evaluation.evaluate import mean_iou, metrics
-from caldrive.perception.targets import class_weights, decode, encode, loss, losses
+from caldrive.perception.targets import class_weights, decode, encode, multitask_loss, task_losses
+from caldrive.perception.training.config import LossWeights
+from caldrive.perception.training.multitask import SEGMENTATION
 
 affordances = st.builds(
     Affordances,
@@ -42,22 +44,22 @@ def perfect_outputs(targets: dict[str, Tensor]) -> dict[str, Tensor]:
 
 @given(affordances)
 def test_decoding_undoes_encoding(label: Affordances) -> None:
-    found = decode(perfect_outputs(encoded(label)))
-    assert found.speed_sign == label.speed_sign
-    for name in ("hazard_stop", "red_light", "vehicle_distance", "relative_angle", "center_distance"):
-        assert getattr(found, name) == pytest.approx(getattr(label, name), abs=1e-5)
+    decoded = decode(perfect_outputs(encoded(label)))
+    assert decoded.speed_sign == label.speed_sign
+    for name in {spec.name for spec in SPECS} - {"speed_sign"}:
+        assert getattr(decoded, name) == pytest.approx(getattr(label, name), abs=1e-5)
 
 
 def test_decoded_values_stay_in_their_ranges() -> None:
     outputs = perfect_outputs(encoded(Affordances()))
-    outputs |= {name: torch.tensor([[9.0]]) for name in ("vehicle_distance", "relative_angle", "center_distance")}
-    found = decode(outputs)
-    assert (found.vehicle_distance, found.center_distance) == (50.0, 2.0)
-    assert found.relative_angle == pytest.approx(math.pi)
+    outputs |= {spec.name: torch.tensor([[9.0]]) for spec in CONTINUOUS}
+    decoded = decode(outputs)
+    assert (decoded.vehicle_distance, decoded.center_distance) == (50.0, 2.0)
+    assert decoded.relative_angle == pytest.approx(math.pi)
 
 
 def test_only_angle_and_center_distance_hang_on_the_command() -> None:
-    assert [s.name for s in SPECS if s.conditional] == ["relative_angle", "center_distance"]
+    assert [spec.name for spec in CONDITIONAL] == ["relative_angle", "center_distance"]
 
 
 def test_class_weights_are_inverse_to_the_counts_with_mean_one_over_the_samples() -> None:
@@ -71,10 +73,10 @@ def test_class_weights_are_inverse_to_the_counts_with_mean_one_over_the_samples(
 def test_the_loss_adds_all_six_in_scaled_units() -> None:
     targets = encoded(Affordances())
     outputs = perfect_outputs(targets)
-    assert float(loss(outputs, targets)) == pytest.approx(0.0, abs=1e-6)
+    assert float(multitask_loss(outputs, targets)) == pytest.approx(0.0, abs=1e-6)
     outputs["center_distance"] = outputs["center_distance"] + 0.5
     outputs["vehicle_distance"] = outputs["vehicle_distance"] - 0.25
-    assert float(loss(outputs, targets)) == pytest.approx(0.75, abs=1e-6)
+    assert float(multitask_loss(outputs, targets)) == pytest.approx(0.75, abs=1e-6)
 
 
 def test_the_relative_angle_may_count_more_than_the_others() -> None:
@@ -82,7 +84,8 @@ def test_the_relative_angle_may_count_more_than_the_others() -> None:
     outputs = perfect_outputs(targets)
     outputs["relative_angle"] = outputs["relative_angle"] + 0.5
     outputs["center_distance"] = outputs["center_distance"] + 0.25
-    assert float(loss(outputs, targets, angle_weight=5.0)) == pytest.approx(2.75, abs=1e-6)
+    weights = vars(LossWeights(relative_angle=5.0))
+    assert float(multitask_loss(outputs, targets, task_weights=weights)) == pytest.approx(2.75, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -93,18 +96,22 @@ def test_an_output_beyond_a_limit_is_right_where_the_truth_is_at_it(name: str, l
     whole, half = dict[str, Any]({name: limit}), dict[str, Any]({name: limit / 2})
     at_limit, within = encoded(Affordances(**whole)), encoded(Affordances(**half))
     for targets, wrong_by in ((at_limit, 0.0), (within, 0.3)):
-        beyond = losses({name: perfect_outputs(targets)[name] + math.copysign(0.3, limit)}, targets)[name]
+        beyond = task_losses({name: perfect_outputs(targets)[name] + math.copysign(0.3, limit)}, targets)[name]
         assert float(beyond) == pytest.approx(wrong_by, abs=1e-6)
-    short = losses({name: perfect_outputs(at_limit)[name] - math.copysign(0.3, limit)}, at_limit)[name]
+    short = task_losses({name: perfect_outputs(at_limit)[name] - math.copysign(0.3, limit)}, at_limit)[name]
     assert float(short) == pytest.approx(0.3, abs=1e-6)
 
 
 def test_a_rare_class_pulls_harder() -> None:
     targets = encoded(Affordances(hazard_stop=1.0))
     outputs = perfect_outputs(encoded(Affordances(hazard_stop=0.0)))
-    weights = class_weights({s.name: np.array([99.0] + [1.0] * (s.outputs - 1)) for s in SPECS if s.discrete})
-    plain = losses(outputs, targets)["hazard_stop"]
-    assert losses(outputs, targets, weights)["hazard_stop"] > 10 * plain
+    weights = class_weights({s.name: np.array([99.0] + [1.0] * (s.outputs - 1)) for s in DISCRETE})
+    unweighted = task_losses(outputs, targets)["hazard_stop"]
+    assert task_losses(outputs, targets, weights)["hazard_stop"] > 10 * unweighted
+
+
+def test_there_is_a_weight_for_the_loss_of_each_affordance_and_of_the_segmentation() -> None:
+    assert vars(LossWeights()).keys() == {spec.name for spec in SPECS} | {SEGMENTATION}
 
 
 def test_mean_iou_counts_each_class_alike() -> None:
@@ -116,7 +123,7 @@ def test_mean_iou_counts_each_class_alike() -> None:
 def test_metrics_are_in_si_units_and_scaled() -> None:
     targets = encoded(Affordances(vehicle_distance=20.0))
     outputs = perfect_outputs(encoded(Affordances(vehicle_distance=25.0)))
-    found = metrics(outputs, targets)
-    assert found["vehicle_distance/mae"] == pytest.approx(5.0, abs=1e-4)
-    assert found["vehicle_distance/mae_scaled"] == pytest.approx(0.1, abs=1e-6)
-    assert found["speed_sign/iou"] == 1.0
+    figures = metrics(outputs, targets)
+    assert figures["vehicle_distance/mae"] == pytest.approx(5.0, abs=1e-4)
+    assert figures["vehicle_distance/mae_scaled"] == pytest.approx(0.1, abs=1e-6)
+    assert figures["speed_sign/iou"] == 1.0

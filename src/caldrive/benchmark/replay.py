@@ -62,6 +62,6 @@ def _film(folder: RunFolder, trial: Trial, out: Path, progress: Progress) -> Epi
             film.add(step)
             progress(trial.key, min(1.0, step.truth.route_done / step.truth.route_length))
 
-        result = run_episode(world, agent, trial.scenario, watch, referee)
+        result = run_episode(world, agent, trial.scenario, on_step=watch, referee=referee)
         film.end(result)
     return result

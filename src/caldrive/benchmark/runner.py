@@ -60,7 +60,7 @@ def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
         artifacts.add(step)
 
     try:
-        result = run_episode(world, agent, trial.scenario, watch, referee)
+        result = run_episode(world, agent, trial.scenario, on_step=watch, referee=referee)
     except AgentError as error:
         raise AgentError(f"{error} (in episode {trial.key})") from error
     figures = {name: plain(value) for name, value in metrics.metrics(result.infractions).items()}

@@ -59,11 +59,11 @@ class Replay(Output):
         from caldrive.results import result_values
 
         again = replay(self.folder, self.episode, self.out, progress)
-        infractions = ", ".join(f"{one.kind.value} at {one.time:.1f} s" for one in again.result.infractions) or "none"
+        infractions = [f"{infraction.kind.value} at {infraction.time:.1f} s" for infraction in again.result.infractions]
         same = "as before" if again.same else "not as before: other code, another model or no earlier result"
-        sentence = f"{self.episode} {again.result.outcome.value}; infractions: {infractions}; video: {again.video}"
+        sentence = f"{self.episode} {again.result.outcome.value}; infractions: {', '.join(infractions) or 'none'}"
         values = {"video": str(again.video), "same": again.same, "result": result_values(again.result)}
-        return Answer(values, f"{sentence}; {same}", int(not again.same))
+        return Answer(values, f"{sentence}; video: {again.video}; {same}", int(not again.same))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -139,11 +139,6 @@ def benchmark_table(results: Sequence[TrialResult], out: str) -> Group:
     return Group(success_table(results), infraction_table(results), Text(f"results: {out}"))
 
 
-def _metric(spec: AffordanceSpec) -> str:
-    """The name of the affordance's figure: mean IoU of a discrete one, mean absolute error of the others."""
-    return f"{spec.name}/iou" if spec.discrete else f"{spec.name}/mae"
-
-
 def _head(spec: AffordanceSpec) -> str:
     words = spec.title.replace(" ", "\n")
     return f"{words}\nIoU %" if spec.discrete else f"{words}\n{spec.unit}"
@@ -151,12 +146,12 @@ def _head(spec: AffordanceSpec) -> str:
 
 def _figures(figures: Mapping[str, float]) -> list[str]:
     """One cell for each affordance, in percent or in SI units."""
-    return [f"{(100 if spec.discrete else 1) * figures[_metric(spec)]:.3g}" for spec in SPECS]
+    return [f"{(100 if spec.discrete else 1) * figures[spec.metric]:.3g}" for spec in SPECS]
 
 
 def _scaled(figures: Mapping[str, float]) -> list[str]:
     """Errors of the continuous affordances in units of their scale, as the supplement prints them."""
-    return ["" if spec.discrete else f"{figures[_metric(spec)] / spec.scale:.3g}" for spec in SPECS]
+    return ["" if spec.discrete else f"{figures[spec.metric] / spec.scale:.3g}" for spec in SPECS]
 
 
 def evaluation_table(report: Report, precision: str) -> Group:

@@ -28,7 +28,7 @@ def chosen_scenarios(settings: EpisodeSettings, n: int) -> list[Scenario]:
     chosen = [_own_scenario(settings)] * n if settings.start or settings.goal else _of_task(settings, n)
     if settings.seconds is None:
         return chosen
-    return [replace(one, time_limit=min(one.time_limit, settings.seconds)) for one in chosen]
+    return [replace(scenario, time_limit=min(scenario.time_limit, settings.seconds)) for scenario in chosen]
 
 
 def _check(settings: EpisodeSettings, n: int) -> None:
@@ -50,11 +50,11 @@ def _check(settings: EpisodeSettings, n: int) -> None:
 
 
 def _of_task(settings: EpisodeSettings, n: int) -> list[Scenario]:
-    found = task_scenarios(
+    of_task = task_scenarios(
         settings.town, settings.task, settings.weather, cars=settings.cars, people=settings.people, seed=settings.seed
     )
-    require_within("--route", settings.route, 0, len(found) - 1, 0)
-    return [found[(settings.route + k) % len(found)] for k in range(n)]
+    require_within("--route", settings.route, 0, len(of_task) - 1, 0)
+    return [of_task[(settings.route + k) % len(of_task)] for k in range(n)]
 
 
 def parse_place(text: str, option: str) -> tuple[float, float, float | None]:

@@ -67,7 +67,7 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
             film = EpisodeFilm(video, world, Shown(text, scenario, referee.infractions, show_truth))
             watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]
             watchers += [film.add] if settings.video else []
-            result = run_episode(world, agent, scenario, _each(watchers), referee)
+            result = run_episode(world, agent, scenario, on_step=_each(watchers), referee=referee)
             film.end(result)
             results.append(result)
             files.append(settings.out / f"episode-{k:03d}.json")

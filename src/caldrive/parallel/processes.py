@@ -30,16 +30,16 @@ def parallel_map(work: Callable[[Item], Result], items: Sequence[Item], workers:
     if workers == 1:
         yield from ((item, work(item)) for item in items)
         return
-    left, deaths = list(range(len(items))), 0
-    while left:
-        before = len(left)
+    missing, deaths = list(range(len(items))), 0
+    while missing:
+        before = len(missing)
         try:
-            with closing(_pool_map(work, {k: items[k] for k in left}, min(workers, before))) as results:
+            with closing(_pool_map(work, {k: items[k] for k in missing}, min(workers, before))) as results:
                 for k, result in results:
-                    left.remove(k)
+                    missing.remove(k)
                     yield items[k], result
         except BrokenProcessPool as error:
-            deaths = deaths + 1 if len(left) == before else 0
+            deaths = deaths + 1 if len(missing) == before else 0
             if deaths == MAX_DEATHS:
                 raise RuntimeError(
                     f"found that workers die, {deaths} times in a row: type --workers 1 to see what happens"

@@ -1,7 +1,7 @@
 """What the network learns: affordances as targets, their losses, and outputs turned back into affordances.
 
-Targets are what the network learns: a class number (int64) or a value divided by its scale (float32), each (N,).
-Outputs are what it gives: logits (N, K) of K classes or scaled values (N, 1).
+A target is a class number (int64) or a value divided by its scale (float32), each (N,). An output is what the network
+gives: logits (N, K) of K classes or scaled values (N, 1).
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ def decode(outputs: Outputs) -> Affordances:
     values: dict[str, Any] = {}
     for spec in SPECS:
         output = outputs[spec.name]
-        if spec.outputs > 2:
-            values[spec.name] = spec.classes[int(output[0].argmax())] or None
-        elif spec.discrete:
+        if spec.binary:
             values[spec.name] = float(output[0].float().softmax(0)[1])
+        elif spec.discrete:
+            values[spec.name] = spec.classes[int(output[0].argmax())] or None
         else:
             values[spec.name] = float(si_values(spec, output)[0])
     return Affordances(**values)
@@ -67,24 +67,29 @@ def class_weights(counts: Mapping[str, NDArray[np.float64]]) -> dict[str, Tensor
     return weights
 
 
-def losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> dict[str, Tensor]:
+def task_losses(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None) -> dict[str, Tensor]:
     """The loss of each affordance among the outputs: class-weighted cross-entropy, or mean absolute error of the scaled
     value (section 3.1), where a target at a limit stands for all beyond it."""
-    result = {}
+    parts = {}
     for spec in (spec for spec in SPECS if spec.name in outputs):
         output, target = outputs[spec.name].float(), targets[spec.name]
         if spec.discrete:
             weight = None if weights is None else weights[spec.name]
             # The mean over samples, not over weights: a batch's few rare samples must not take all of its gradient.
-            result[spec.name] = functional.cross_entropy(output, target, weight, reduction="none").mean()
+            parts[spec.name] = functional.cross_entropy(output, target, weight, reduction="none").mean()
         else:
-            result[spec.name] = scaled_error(spec, output, target).mean()
-    return result
+            parts[spec.name] = scaled_error(spec, output, target).mean()
+    return parts
 
 
-def loss(outputs: Outputs, targets: Targets, weights: ClassWeights | None = None, angle_weight: float = 1.0) -> Tensor:
-    """The whole loss: those of all affordances added, the relative angle's times angle_weight."""
-    parts = losses(outputs, targets, weights)
-    if "relative_angle" in parts:
-        parts["relative_angle"] = angle_weight * parts["relative_angle"]
+def multitask_loss(
+    outputs: Outputs,
+    targets: Targets,
+    weights: ClassWeights | None = None,
+    task_weights: Mapping[str, float] | None = None,
+) -> Tensor:
+    """The losses of all affordances among the outputs, added. task_weights: what each counts; without them 1."""
+    parts = task_losses(outputs, targets, weights)
+    if task_weights is not None:
+        parts = {name: task_weights[name] * part for name, part in parts.items()}
     return torch.stack(list(parts.values())).sum()

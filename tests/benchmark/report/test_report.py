@@ -18,11 +18,12 @@ import pytest
 import simplejpeg
 from rich.console import Console
 
+from caldrive.affordances import BY_NAME
 from caldrive.benchmark.artifacts import trace_path
 from caldrive.benchmark.report import page as page_module
 from caldrive.benchmark.report.figures import error_sums
 from caldrive.benchmark.report.page import report_page, report_text
-from caldrive.benchmark.report.runs import BenchmarkRun, failures, load_run, load_runs
+from caldrive.benchmark.report.runs import LARGE_ERRORS, BenchmarkRun, failures, load_run, load_runs
 from caldrive.benchmark.report.tables import tables
 from caldrive.benchmark.suites import TrialResult, suite
 from caldrive.commands.tables import benchmark_table
@@ -86,15 +87,15 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
     still = folder / "stills" / f"{key}-0.jpg"
     still.parent.mkdir()
     still.write_bytes(simplejpeg.encode_jpeg(np.full((20, 40, 3), 90, np.uint8)))
-    left = {"trace": trace(true_center_distance=after(200, 1.5), command="left")}
+    content = {"trace": trace(true_center_distance=after(200, 1.5), command="left")}
     path = trace_path(folder, key)
     path.parent.mkdir()
-    path.write_bytes(gzip.compress(json.dumps(left).encode()))
+    path.write_bytes(gzip.compress(json.dumps(content).encode()))
     return both
 
 
 def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
-    table = next(one for one in tables(runs) if one.title == "Failure causes")
+    table = next(table for table in tables(runs) if table.title == "Failure causes")
     town = runs[1].results[4].trial.scenario.town
     assert table.rows == (("cal", town, "left its lane", "(100, 0)", "left", "1"),)
     text = "left its lane at (100, 0), left: relative angle off by 0.00 rad"
@@ -103,7 +104,7 @@ def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
 
 
 def test_every_cell_stands_beside_the_papers(runs: list[BenchmarkRun]) -> None:
-    success = next(one for one in tables(runs) if one.title == "Success")
+    success = next(table for table in tables(runs) if table.title == "Success")
     row = dict(zip(success.head, next(r for r in success.rows if r[:2] == ("new town", "navigation")), strict=True))
     assert row["CAL (paper)"] == "70"
     assert row["MP (paper)"] == "24"
@@ -112,18 +113,22 @@ def test_every_cell_stands_beside_the_papers(runs: list[BenchmarkRun]) -> None:
 
 
 def test_infractions_stand_beside_table_2(runs: list[BenchmarkRun]) -> None:
-    found = next(one for one in tables(runs) if one.title == "Infractions")
-    row = next(r for r in found.rows if r[:3] == ("new weather", "navigation-dynamic", "opposite lane"))
+    infractions = next(table for table in tables(runs) if table.title == "Infractions")
+    row = next(r for r in infractions.rows if r[:3] == ("new weather", "navigation-dynamic", "opposite lane"))
     assert row[3].startswith("> ")
     assert row[-1] == ">60"
-    row = next(r for r in found.rows if r[:3] == ("new weather", "all", "opposite lane"))
+    row = next(r for r in infractions.rows if r[:3] == ("new weather", "all", "opposite lane"))
     assert row[-4:] == ("", "", "", "")  # the paper counts in one task only
 
 
 def test_failures_say_what_was_wrong_before(runs: list[BenchmarkRun]) -> None:
-    found = failures(runs)
-    assert len(found) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].results)))
-    assert found[0].errors_before == ("relative angle 0.30 rad, hazard stop 50 %",)
+    failed = failures(runs)
+    assert len(failed) == 2 * sum(k % 5 == 4 for k in range(len(runs[0].results)))
+    assert failed[0].errors_before == ("relative angle 0.30 rad, hazard stop 50 %",)
+
+
+def test_every_affordance_has_an_error_from_which_it_is_named() -> None:
+    assert set(LARGE_ERRORS) == set(BY_NAME)
 
 
 def test_the_text_holds_all_tables_and_failures(runs: list[BenchmarkRun]) -> None:
@@ -214,9 +219,9 @@ def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
     monkeypatch.setattr(page_module, "MAX_STILLS", 1)
     slow, breaker = runs[1].results[4], runs[1].results[9]
     slow = replace(slow, episode=replace(slow.episode, infractions=()))
-    for one, width in ((slow, 40), (breaker, 41)):
+    for result, width in ((slow, 40), (breaker, 41)):
         picture = simplejpeg.encode_jpeg(np.full((20, width, 3), width, np.uint8))
-        (runs[1].folder / "stills" / f"{one.trial.key}-0.jpg").write_bytes(picture)
+        (runs[1].folder / "stills" / f"{result.trial.key}-0.jpg").write_bytes(picture)
     html = report_page([replace(runs[1], results=(slow, breaker))])
     (shown,) = re.findall(r"data:image/jpeg;base64,([^\"]+)", html)
     (runs[1].folder / "stills" / f"{breaker.trial.key}-0.jpg").unlink()
@@ -224,10 +229,10 @@ def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
 
 
 def column(page: Any, table: int, head: str) -> list[str]:
-    found = page.locator("table").nth(table)
-    heads = found.locator("th").all_inner_texts()
+    of_page = page.locator("table").nth(table)
+    heads = of_page.locator("th").all_inner_texts()
     at = next(i for i, text in enumerate(heads) if text.startswith(head))
-    return [row.locator("td").nth(at).inner_text() for row in found.locator("tbody tr").all()]
+    return [row.locator("td").nth(at).inner_text() for row in of_page.locator("tbody tr").all()]
 
 
 def test_the_page_opens_with_its_tables_plots_and_stills(page: Any) -> None:
@@ -257,9 +262,9 @@ def test_failures_are_filtered_by_agent_and_kind(page: Any, runs: list[Benchmark
     page.select_option("select[data-filter=kind]", "sidewalk")
     shown = page.locator("article:visible")
     expected = [
-        one
-        for one in failures(runs[1:])
-        if any(i.kind is InfractionKind.SIDEWALK for i in one.result.episode.infractions)
+        failure
+        for failure in failures(runs[1:])
+        if any(i.kind is InfractionKind.SIDEWALK for i in failure.result.episode.infractions)
     ]
     assert shown.count() == len(expected) > 0
     assert page.locator("#shown").inner_text() == str(len(expected))

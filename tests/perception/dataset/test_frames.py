@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Control
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.dataset.sampler import rarity
@@ -17,7 +18,7 @@ SIZE = (HEIGHT, WIDTH)
 
 
 def test_a_window_stays_in_one_stream(frames: Frames) -> None:
-    starts = frames.starts(5)
+    starts = frames.window_starts(5)
     assert len(starts) == 4 * 2 * 16
     assert (frames.stream_start[starts] == frames.stream_start[starts + 4]).all()
 
@@ -35,8 +36,8 @@ def test_overlapping_windows_share_their_frames(frames: Frames) -> None:
     assert batch.index.tolist() == [[0, 1, 2, 3, 4, 5, 6], [2, 3, 4, 5, 6, 7, 8]]
     assert batch.group.tolist() == [0] * 7 + [1] * 2
     assert batch.targets["center_distance"].shape == (8,)
-    wanted = frames.column("center_distance")[[5, 6, 7, 8, 7, 8, 9, 10]] / 1.65
-    np.testing.assert_allclose(batch.targets["center_distance"].numpy(), wanted, rtol=1e-5)
+    expected = frames.column("center_distance")[[5, 6, 7, 8, 7, 8, 9, 10]] / 1.65
+    np.testing.assert_allclose(batch.targets["center_distance"].numpy(), expected, rtol=1e-5)
 
 
 def test_history_before_a_stream_is_its_first_frame(frames: Frames) -> None:
@@ -52,26 +53,27 @@ def test_images_from_memory_and_from_jpeg_are_the_same(folder: Path, frames: Fra
 
 def test_the_digest_depends_on_the_images(folder: Path) -> None:
     episodes = find_episodes(folder)
-    same, brighter = Frames(episodes, SIZE), replace(episodes[0], jpegs=[one + b"0" for one in episodes[0].jpegs])
+    same, brighter = Frames(episodes, SIZE), replace(episodes[0], jpegs=[jpeg + b"0" for jpeg in episodes[0].jpegs])
     assert Frames(find_episodes(folder), SIZE).digest == same.digest
     assert Frames([brighter, *episodes[1:]], SIZE).digest != same.digest
 
 
 def test_another_image_size_is_refused(folder: Path) -> None:
-    with pytest.raises(EpisodeError, match="64 x 32, the network takes 200 x 88"):
+    with pytest.raises(EpisodeError, match=r"images of 64 x 32 .* wanted 200 x 88"):
         Frames(find_episodes(folder), (88, 200), cache_gb=1.0)
 
 
 def test_another_command_changes_what_depends_on_it_and_nothing_else(frames: Frames) -> None:
     ids = np.arange(12)[:, None]  # the commands change every four frames: left, straight, right
-    command, targets = frames.lessons(ids)
-    turned, others = frames.lessons(ids, np.arange(12) != 11)
+    command, targets = frames.commands_and_targets(ids)
+    alternative_command, alternative_targets = frames.commands_and_targets(ids, np.arange(12) != 11)
     assert command[:, 0].tolist() == [0] * 4 + [1] * 4 + [2] * 4
-    assert turned[:, 0].tolist() == [0] * 4 + [1] * 4 + [0] * 3 + [2]
-    angle = 0.759
-    assert (targets["relative_angle"] * angle).numpy() == pytest.approx(0.1)
-    assert (others["relative_angle"] * angle).numpy() == pytest.approx(np.array([0.1] * 8 + [0.3] * 3 + [0.1]))
-    assert all((targets[name] == others[name]).all() for name in targets if name != "relative_angle")
+    assert alternative_command[:, 0].tolist() == [0] * 4 + [1] * 4 + [0] * 3 + [2]
+    scale = BY_NAME["relative_angle"].scale
+    angles, alternative_angles = (by_name["relative_angle"].numpy() for by_name in (targets, alternative_targets))
+    assert angles * scale == pytest.approx(0.1)
+    assert alternative_angles * scale == pytest.approx(np.array([0.1] * 8 + [0.3] * 3 + [0.1]))
+    assert all((targets[name] == alternative_targets[name]).all() for name in targets if name != "relative_angle")
 
 
 def test_a_batch_may_ask_what_another_command_would(frames: Frames) -> None:

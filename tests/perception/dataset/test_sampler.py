@@ -41,6 +41,6 @@ def test_draws_depend_on_seed_and_step_only(frames: Frames) -> None:
 
 def test_half_of_the_windows_may_be_seen_with_another_command(frames: Frames) -> None:
     sampler = Sampler(frames, 1, 0.5, seed=3)
-    assert sampler.others(7, 1000, 0.5).mean() == pytest.approx(0.5, abs=0.06)
-    assert (sampler.others(7, 1000, 0.5) == sampler.others(7, 1000, 0.5)).all()
-    assert (sampler.others(7, 1000, 0.5) != sampler.others(8, 1000, 0.5)).any()
+    assert sampler.alternatives(7, 1000, 0.5).mean() == pytest.approx(0.5, abs=0.06)
+    assert (sampler.alternatives(7, 1000, 0.5) == sampler.alternatives(7, 1000, 0.5)).all()
+    assert (sampler.alternatives(7, 1000, 0.5) != sampler.alternatives(8, 1000, 0.5)).any()

@@ -8,16 +8,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from caldrive.affordances import SPECS
+from caldrive.affordances import BY_NAME
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import outputs_on
-from caldrive.perception.evaluation.report import WORST, errors, report, worst
+from caldrive.perception.evaluation.report import (
+    PUBLISHED,
+    WORST,
+    errors,
+    published_figures,
+    published_metrics,
+    report,
+    worst,
+)
 from caldrive.perception.network.network import Network
 from caldrive.recordings.folder import find_episodes
 from caldrive.recordings.writer import EpisodeWriter
 from tests.perception.data import HEIGHT, SCENARIO, TINY, WIDTH, make_frame, record
 
-DISTANCE = next(spec for spec in SPECS if spec.name == "vehicle_distance")
+DISTANCE = BY_NAME["vehicle_distance"]
 AHEAD = (1.0, 4.0, 4.0, 8.0, 20.0, 30.0, 50.0, 50.0)
 
 
@@ -33,30 +41,30 @@ def frames(tmp_path: Path) -> Frames:
 
 def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_yaw(frames: Frames) -> None:
     network = Network(TINY).eval()
-    found = report(network, frames, network.features)
-    assert found.frames == len(AHEAD)
-    cars = found.groups["car ahead"]
+    evaluation = report(network, frames, network.features)
+    assert evaluation.frames == len(AHEAD)
+    cars = evaluation.groups["car ahead"]
     assert list(cars) == ["00 to 03 m", "03 to 06 m", "06 to 12 m", "12 to 25 m", "25 to 50 m", "none"]
     weights = dict(zip(cars, (1, 2, 1, 1, 1, 2), strict=True))
     mean = sum(n * cars[name]["vehicle_distance/mae"] for name, n in weights.items()) / len(AHEAD)
-    assert mean == pytest.approx(found.overall["vehicle_distance/mae"], rel=1e-4)
+    assert mean == pytest.approx(evaluation.overall["vehicle_distance/mae"], rel=1e-4)
     wrong = errors(DISTANCE, *outputs_on(network, frames, network.features))
     assert cars["00 to 03 m"]["vehicle_distance/mae"] == pytest.approx(wrong[0], rel=1e-4)
     assert cars["25 to 50 m"]["vehicle_distance/mae"] == pytest.approx(wrong[5], rel=1e-4)
-    places = {name: row["vehicle_distance/mae"] for name, row in found.groups["place"].items()}
+    places = {name: row["vehicle_distance/mae"] for name, row in evaluation.groups["place"].items()}
     inside = np.array(frames.column("junction"))
     assert 0 < inside.sum() < len(inside)
-    wanted = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
-    assert places == pytest.approx(wanted, rel=1e-4)
-    turned = {name: row["vehicle_distance/mae"] for name, row in found.groups["camera turned"].items()}
+    expected = {"in a junction": wrong[inside].mean(), "on a street": wrong[~inside].mean()}
+    assert places == pytest.approx(expected, rel=1e-4)
+    turned = {name: row["vehicle_distance/mae"] for name, row in evaluation.groups["camera turned"].items()}
     assert turned == pytest.approx({"05 to 10 °": wrong[3:].mean(), "10 ° and more": wrong[:3].mean()}, rel=1e-4)
-    assert set(found.groups["command"]) == {"left", "straight"}
+    assert set(evaluation.groups["command"]) == {"left", "straight"}
 
 
-def test_the_worst_frames_are_of_moments_apart_whichever_camera_saw_them(tmp_path: Path) -> None:
+def test_the_worst_frames_are_of_times_apart_whichever_camera_saw_them(tmp_path: Path) -> None:
     frames = Frames(find_episodes(record(tmp_path, n_episodes=2, n_frames=80, n_cameras=2)), (HEIGHT, WIDTH))
     wrong = np.zeros(len(frames))
-    place = {(e, m, c): i for i, (e, m, c) in enumerate(_places(frames))}
+    place = {(e, t, c): i for i, (e, t, c) in enumerate(_places(frames))}
     for error, where in ((9, (0, 10, 0)), (8, (0, 10, 1)), (7, (0, 30, 1)), (6, (1, 10, 0)), (5, (0, 45, 1))):
         wrong[place[where]] = error
     chosen = worst(wrong, frames)
@@ -65,9 +73,9 @@ def test_the_worst_frames_are_of_moments_apart_whichever_camera_saw_them(tmp_pat
 
 
 def _places(frames: Frames) -> list[tuple[int, int, int]]:
-    """Episode, moment and camera of each frame."""
+    """Episode, time step and camera of each frame."""
     cameras = [episode.columns["camera"][row] for episode, row in map(frames.source, range(len(frames)))]
-    return [(int(e), int(m), int(c)) for e, m, c in zip(frames.episode, frames.moment, cameras, strict=True)]
+    return [(int(e), int(t), int(c)) for e, t, c in zip(frames.episode, frames.time_step, cameras, strict=True)]
 
 
 def test_the_worst_frames_are_drawn_with_what_was_seen_and_what_was_true(frames: Frames, tmp_path: Path) -> None:
@@ -80,12 +88,22 @@ def test_figures_are_told_apart_by_weather_and_town_and_classes_that_are_confuse
     for number, (town, weather) in enumerate((("town01", 1), ("town01", 3), ("town02", 3))):
         record(tmp_path / str(number), n_episodes=1, scenario=replace(SCENARIO, town=town, weather=weather))
     frames, network = Frames(find_episodes(tmp_path), (HEIGHT, WIDTH)), Network(TINY).eval()
-    found = report(network, frames, network.features)
+    evaluation = report(network, frames, network.features)
     outputs, targets = outputs_on(network, frames, network.features)
     wrong = errors(DISTANCE, outputs, targets).reshape(3, -1).mean(axis=1)  # by episode
-    for kind, wanted in (("weather", {"1": wrong[0], "3": wrong[1:].mean()}), ("town", {"town01": wrong[:2].mean()})):
-        for value, error in wanted.items():
-            assert found.groups[kind][value]["vehicle_distance/mae"] == pytest.approx(error, rel=1e-4)
+    for kind, expected in (("weather", {"1": wrong[0], "3": wrong[1:].mean()}), ("town", {"town01": wrong[:2].mean()})):
+        for value, error in expected.items():
+            assert evaluation.groups[kind][value]["vehicle_distance/mae"] == pytest.approx(error, rel=1e-4)
     seen, true = outputs["hazard_stop"].argmax(1), targets["hazard_stop"]
-    wanted_counts = [[int(((true == t) & (seen == s)).sum()) for s in (0, 1)] for t in (0, 1)]
-    assert found.confusion["hazard_stop"] == wanted_counts
+    expected_counts = [[int(((true == t) & (seen == s)).sum()) for s in (0, 1)] for t in (0, 1)]
+    assert evaluation.confusion["hazard_stop"] == expected_counts
+
+
+def test_the_papers_figures_stand_beside_a_networks_by_the_same_names(frames: Frames) -> None:
+    network = Network(TINY).eval()
+    overall = report(network, frames, network.features).overall
+    assert len(PUBLISHED) == len(published_metrics()) == len(published_figures()) == 6
+    assert (published_metrics().keys() | published_figures().keys()) <= overall.keys()
+    assert published_metrics()["vehicle_distance/mae_scaled"] == 0.03289
+    assert published_figures()["vehicle_distance/mae"] == pytest.approx(50 * 0.03289)
+    assert published_figures()["red_light/iou"] == published_metrics()["red_light/iou"] == 0.9395

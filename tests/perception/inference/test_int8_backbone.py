@@ -11,7 +11,6 @@ import torch
 from torch import Tensor
 
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.inference.engines import driving_precision
 from caldrive.perception.inference.openvino_engine import Int8Backbone
 from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.perception.network.calibration import input_ranges
@@ -25,7 +24,7 @@ def columns() -> Tensor:
     return normalise(to_float(np.stack([column_image(place / 4) for place in range(-4, 5)])))
 
 
-def made(batch_norm: bool, height: int = HEIGHT, width: int = WIDTH) -> Network:
+def network_of(batch_norm: bool, height: int = HEIGHT, width: int = WIDTH) -> Network:
     torch.manual_seed(0)
     network = Network(replace(TINY, batch_norm=batch_norm, width=0.25, image_height=height, image_width=width))
     network.train().features(torch.randn(9, 3, height, width))  # statistics for the norms
@@ -34,16 +33,16 @@ def made(batch_norm: bool, height: int = HEIGHT, width: int = WIDTH) -> Network:
 
 @pytest.fixture(params=(True, False), ids=("batch norm", "no norm"))
 def network(request: pytest.FixtureRequest) -> Network:
-    return made(request.param)
+    return network_of(request.param)
 
 
 @pytest.mark.parametrize("bits", [7, 8])
 @pytest.mark.parametrize("batch_norm", [True, False])
 @pytest.mark.parametrize("size", [(HEIGHT, WIDTH), (44, 100)], ids=("even", "cut off by pools"))
 def test_eight_bits_give_nearly_the_features_of_thirty_two(size: tuple[int, int], batch_norm: bool, bits: int) -> None:
-    network, images = made(batch_norm, *size), torch.randn(4, 3, *size)
+    network, images = network_of(batch_norm, *size), torch.randn(4, 3, *size)
     ranges = input_ranges(network.backbone, images)
-    backbone = Int8Backbone(network.backbone, ranges, *size, threads=1, bits=bits)
+    backbone = Int8Backbone(network.backbone, ranges, size, threads=1, bits=bits)
     with torch.no_grad():
         exact, rounded = network.features(images), backbone(images)
     assert rounded.shape == exact.shape
@@ -72,19 +71,19 @@ def test_integers_do_not_hide_weights_that_are_not_numbers(network: Network) -> 
     ranges = input_ranges(network.backbone, columns())
     network.backbone.convolutions()[3].weight.data[0, 0, 0, 0] = float("nan")
     with pytest.raises(ValueError, match="not numbers"):
-        Int8Backbone(network.backbone, ranges, HEIGHT, WIDTH, threads=1)
+        Int8Backbone(network.backbone, ranges, (HEIGHT, WIDTH), threads=1)
 
 
 def test_openvino_tells_its_makers_nothing() -> None:
     module = "caldrive.perception.inference.openvino_engine"
     code = f"import sys, {module}; print([n for n in sys.modules if 'telemetry' in n])"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "[]"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
 
 
 def test_ranges_of_another_backbone_are_refused(network: Network) -> None:
     with pytest.raises(ValueError, match="found 3 ranges, wanted 13"):
-        Int8Backbone(network.backbone, (1.0, 1.0, 1.0), HEIGHT, WIDTH, threads=1)
+        Int8Backbone(network.backbone, (1.0, 1.0, 1.0), (HEIGHT, WIDTH), threads=1)
 
 
 def test_a_network_with_ranges_drives_in_integers(network: Network, tmp_path: Path) -> None:
@@ -104,25 +103,7 @@ def test_weights_of_seven_bits_do_not_overflow_sixteen(network: Network) -> None
         conv.weight.data.abs_()
     images = columns().abs()
     ranges = input_ranges(network.backbone, images)
-    backbone = Int8Backbone(network.backbone, ranges, HEIGHT, WIDTH, threads=1, bits=7)
+    backbone = Int8Backbone(network.backbone, ranges, (HEIGHT, WIDTH), threads=1, bits=7)
     with torch.no_grad():
         exact, rounded = network.features(images), backbone(images)
     assert float((rounded - exact).norm() / exact.norm()) < 0.05
-
-
-@pytest.mark.parametrize(("able", "wanted"), [({"avx512_vnni": True}, "int8"), ({"avx2": True}, "int7"), ({}, "fp32")])
-def test_each_processor_drives_in_the_integers_that_it_adds_rightly(
-    able: dict[str, bool], wanted: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("torch.cpu.get_capabilities", lambda: able)
-    assert driving_precision("auto", CheckpointInfo(TINY, ranges=(1.0,) * 13)) == wanted
-
-
-def test_eight_bits_need_ranges() -> None:
-    without, known = CheckpointInfo(TINY), CheckpointInfo(TINY, ranges=(1.0,) * 13)
-    assert driving_precision("fp32", known) == "fp32"
-    assert driving_precision("auto", without) in ("fp32", "bf16")
-    with pytest.raises(ValueError, match="ranges"):
-        driving_precision("int8", without)
-    with pytest.raises(ValueError, match="wanted one of auto, fp32, bf16, int8, int7"):
-        driving_precision("int4", known)

@@ -10,8 +10,8 @@ import torch
 from torch import nn
 
 from caldrive.affordances import SPECS
-from caldrive.perception.inference.engines import blocks_in
-from caldrive.perception.inference.openvino_engine import BlockGraphs
+from caldrive.perception.inference.engines import blocks_engine
+from caldrive.perception.inference.openvino_engine import OpenVINOBlocks
 from caldrive.perception.network.config import BlockConfig
 from caldrive.perception.network.network import COMMANDS, Network
 from tests.perception.data import TINY
@@ -27,7 +27,7 @@ BLOCKS = [
 TESTED = ("hazard_stop", "relative_angle")  # one that is conditional
 
 
-def made(block: BlockConfig) -> Network:
+def network_with(block: BlockConfig) -> Network:
     """A network whose norms have seen something, with this block for a few affordances."""
     torch.manual_seed(0)
     blocks: dict[str, Any] = {spec.name: block if spec.name in TESTED else BlockConfig("dense", 4) for spec in SPECS}
@@ -52,33 +52,33 @@ def history(network: Network) -> torch.Tensor:
 @pytest.mark.parametrize("block", BLOCKS, ids=str)
 @pytest.mark.parametrize("command", range(len(COMMANDS)))
 def test_a_graph_gives_the_values_of_the_block(block: BlockConfig, command: int) -> None:
-    network = made(block)
-    graphs, given = BlockGraphs(network, threads=1), torch.tensor([command])
+    network = network_with(block)
+    engine, commands = OpenVINOBlocks(network, threads=1), torch.tensor([command])
     with torch.inference_mode():
-        wanted, found = network(history(network), given), graphs(history(network), given)
-    assert list(found) == list(wanted)
-    for name, value in wanted.items():
-        assert found[name].shape == value.shape
-        assert torch.allclose(found[name], value, atol=1e-5), name
+        expected, outputs = network(history(network), commands), engine(history(network), commands)
+    assert list(outputs) == list(expected)
+    for name, value in expected.items():
+        assert outputs[name].shape == value.shape
+        assert torch.allclose(outputs[name], value, atol=1e-5), name
 
 
 def test_what_a_frame_gave_stays_when_the_next_one_comes() -> None:
-    network = made(BLOCKS[0])
-    graphs, command = BlockGraphs(network, threads=1), torch.tensor([0])
-    first = graphs(history(network), command)["relative_angle"]
-    kept = first.clone()
-    assert not torch.equal(graphs(history(network) + 1, command)["relative_angle"], kept)
-    assert torch.equal(first, kept)
+    network = network_with(BLOCKS[0])
+    engine, command = OpenVINOBlocks(network, threads=1), torch.tensor([0])
+    first = engine(history(network), command)["relative_angle"]
+    copy = first.clone()
+    assert not torch.equal(engine(history(network) + 1, command)["relative_angle"], copy)
+    assert torch.equal(first, copy)
 
 
 def test_recurrent_blocks_pass_torch() -> None:
-    network = made(BlockConfig("gru", 8, length=3))
-    assert blocks_in("int7", network, 1) is network
+    network = network_with(BlockConfig("gru", 8, length=3))
+    assert blocks_engine("int7", network, 1) is network
     with pytest.raises(ValueError, match="found task blocks of gru, wanted dense or tconv"):
-        BlockGraphs(network, threads=1)
+        OpenVINOBlocks(network, threads=1)
 
 
 def test_only_beside_a_backbone_in_integers_they_pass_openvino() -> None:
-    network = made(BLOCKS[2])
-    assert blocks_in("fp32", network, 1) is network
-    assert isinstance(blocks_in("int8", network, 1), BlockGraphs)
+    network = network_with(BLOCKS[2])
+    assert blocks_engine("fp32", network, 1) is network
+    assert isinstance(blocks_engine("int8", network, 1), OpenVINOBlocks)

@@ -15,7 +15,7 @@ from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.network.network import Network
 from caldrive.perception.targets import decode
-from caldrive.perception.training.multitask import Lessons
+from caldrive.perception.training.multitask import MultiTaskModel
 from caldrive.recordings.reader import read_episode
 from tests.perception.data import HEIGHT, TINY, WIDTH, column_image, record, see, values
 
@@ -31,12 +31,12 @@ def test_driving_gives_what_the_whole_episode_gives(network: Network, tmp_path: 
     episode = read_episode(path)
     batch = Frames([episode], (HEIGHT, WIDTH)).batch(np.array([0]), 14, network.span - 1)
     with torch.no_grad():
-        whole = Lessons(network)(normalise(to_float(batch.images)), batch.index, batch.command)
+        whole = MultiTaskModel(network)(normalise(to_float(batch.images)), batch.index, batch.command)
     perception = NetworkPerception(network, "fp32")
     for i, frame in enumerate(episode):
-        found = perception.predict(Observation(frame.time, frame.image, frame.speed, frame.command))
-        wanted = decode({name: output[i : i + 1] for name, output in whole.items()})
-        assert values(found) == pytest.approx(values(wanted), abs=1e-4)
+        affordances = perception.predict(Observation(frame.time, frame.image, frame.speed, frame.command))
+        expected = decode({name: output[i : i + 1] for name, output in whole.items()})
+        assert values(affordances) == pytest.approx(values(expected), abs=1e-4)
 
 
 def test_each_frame_passes_the_backbone_once(network: Network) -> None:

@@ -6,14 +6,14 @@ from typing import Any
 import torch
 
 from caldrive.perception.dataset.frames import Frames
-from caldrive.perception.dataset.sampler import summary
+from caldrive.perception.dataset.sampler import data_summary
 from caldrive.perception.network.calibration import calibrated, uncalibrated
 from caldrive.perception.network.network import Network
 from caldrive.recordings.folder import find_episodes
 from tests.perception.data import HEIGHT, TINY, WIDTH, record
 
 
-def outputs(network: Network, name: str) -> Any:
+def output_layer(network: Network, name: str) -> Any:
     """The last layer of an affordance's task block."""
     block: Any = network.blocks[name]
     return block.groups[0].output
@@ -21,11 +21,11 @@ def outputs(network: Network, name: str) -> Any:
 
 def test_a_network_that_learnt_nothing_is_calibrated_to_how_often_classes_occur(tmp_path: Path) -> None:
     frames, network = Frames(find_episodes(record(tmp_path)), (HEIGHT, WIDTH)), Network(TINY)
-    counts = summary(frames, frames)["train_classes"]
+    counts = data_summary(frames, frames)["train_classes"]
     for name in counts:
-        torch.nn.init.zeros_(outputs(network, name).weight)
-        torch.nn.init.zeros_(outputs(network, name).bias)
-        bias = outputs(calibrated(network, counts), name).bias
+        torch.nn.init.zeros_(output_layer(network, name).weight)
+        torch.nn.init.zeros_(output_layer(network, name).bias)
+        bias = output_layer(calibrated(network, counts), name).bias
         share = torch.bincount(frames.targets[name], minlength=len(bias)) / len(frames)
         assert torch.allclose(bias.detach().softmax(0), share, atol=1e-3)
 

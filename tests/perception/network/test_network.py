@@ -8,21 +8,20 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from caldrive.affordances import SPECS
+from caldrive.affordances import BY_NAME, SPECS
 from caldrive.perception.network.backbone import CHANNELS, IMAGENET_LAYERS, Backbone
 from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
-from caldrive.perception.network.config import PERCEPTIONS, BlockConfig, PerceptionConfig
+from caldrive.perception.network.config import NETWORKS, BlockConfig, Layer, NetworkConfig, Norm
 from caldrive.perception.network.network import Network, NodeGroup, TaskBlock
 from tests.perception.data import TINY
 
-ANGLE = next(s for s in SPECS if s.name == "relative_angle")
-HAZARD = next(s for s in SPECS if s.name == "hazard_stop")
+ANGLE, HAZARD = BY_NAME["relative_angle"], BY_NAME["hazard_stop"]
 F = 12
 
 
 @pytest.fixture(autouse=True)
 def _same_weights() -> None:
-    """Drawn anew for each run, six ReLUs are all off once in 64 runs."""
+    """Drawn differently in each run, six ReLUs are all off once in 64 runs."""
     torch.manual_seed(0)
 
 
@@ -38,29 +37,36 @@ def test_feature_count_is_what_the_backbone_gives() -> None:
 
 
 def test_the_small_network_stays_below_ten_megabytes(tmp_path: Path) -> None:
-    config = PerceptionConfig()
+    config = NetworkConfig()
     save_network(tmp_path / "model.safetensors", Network(config), CheckpointInfo(config), half=True)
     assert (tmp_path / "model.safetensors").stat().st_size < 10e6
 
 
 def test_the_paper_network_looks_back_as_far_as_its_red_light_block() -> None:
     with torch.device("meta"):
-        network = Network(PERCEPTIONS["paper"])
+        network = Network(NETWORKS["paper"])
     assert network.span == 27
     assert network.backbone.n_features(144, 320) == 512 * 4 * 10
 
 
 @pytest.mark.parametrize("layer", ["dense", "lstm", "gru", "tconv"])
 @pytest.mark.parametrize(("length", "dilation"), [(1, 1), (2, 3), (5, 2)])
-def test_every_layer_takes_every_sequence(layer: str, length: int, dilation: int) -> None:
+def test_every_layer_takes_every_sequence(layer: Layer, length: int, dilation: int) -> None:
     block = TaskBlock(BlockConfig(layer, 6, 0.0, length, dilation), HAZARD, F).eval()
     features, command = torch.randn(2, 11, F), torch.zeros(2, 3, dtype=torch.long)
     assert block(features, command).shape == (6, 2)
 
 
-def test_an_unknown_layer_is_named() -> None:
-    with pytest.raises(ValueError, match="dense, lstm, gru or tconv"):
-        TaskBlock(BlockConfig("perceptron"), HAZARD, F)
+def test_an_unknown_layer_or_norm_is_named() -> None:
+    with pytest.raises(ValueError, match="found layer 'perceptron' of a task block, wanted dense, lstm, gru or tconv"):
+        BlockConfig("perceptron")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="found norm 'group' of a task block, wanted batch, layer or none"):
+        BlockConfig(norm="group")  # type: ignore[arg-type]
+
+
+def test_every_affordance_has_a_task_block_in_the_settings() -> None:
+    blocks = {name for name, value in vars(NetworkConfig()).items() if isinstance(value, BlockConfig)}
+    assert blocks == {spec.name for spec in SPECS}
 
 
 def test_a_block_looks_at_its_own_frames_only() -> None:
@@ -105,8 +111,8 @@ def test_in_a_mixed_batch_a_group_learns_from_its_own_samples_only() -> None:
     assert all(p.grad is None for p in block.groups[1].parameters())
     block.zero_grad()
     block(features[command[:, 0] == 0], command[command[:, 0] == 0]).sum().backward()
-    for found, wanted in zip(mixed, (p.grad for p in block.groups[0].parameters()), strict=True):
-        torch.testing.assert_close(found, wanted)
+    for gradient, expected in zip(mixed, (p.grad for p in block.groups[0].parameters()), strict=True):
+        torch.testing.assert_close(gradient, expected)
 
 
 def test_all_six_affordances_come_out_for_each_frame() -> None:
@@ -137,7 +143,7 @@ def test_foreign_imagenet_weights_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="missing"):
         Backbone(1.0).load_imagenet(path)
     save_file({"features.0.weight": torch.zeros(8, 3, 3, 3)}, path)
-    with pytest.raises(ValueError, match=r"features\.0\.weight of shape \(8, 3, 3, 3\)"):
+    with pytest.raises(ValueError, match=r"found features\.0\.weight of shape \(8, 3, 3, 3\)"):
         Backbone(1.0).load_imagenet(path)
     with pytest.raises(ValueError, match="type --preset paper"):
         Network(replace(TINY, width=0.25)).backbone.load_imagenet(path)
@@ -154,19 +160,19 @@ def test_imagenet_weights_are_read_as_torch_hub_keeps_them_and_nothing_else_is_u
             backbone.load_imagenet(path)
 
 
-def alive_after_training(norm: str) -> float:
-    """Share of a group's nodes that are ever above zero after steps like those of a training's beginning."""
+def alive_after_training(norm: Norm) -> float:
+    """Share of a group's nodes that are ever above zero after steps like the first ones of a training."""
     group = NodeGroup(BlockConfig("tconv", 64, 0.0, length=5, norm=norm), 1536, 1).train()
     optimizer = torch.optim.Adam(group.parameters(), 1e-3)
-    direction, seen = torch.randn(1536) / 1536**0.5, []
-    group.output.register_forward_pre_hook(lambda module, inputs: seen.append(inputs[0].detach()))
+    direction, hidden = torch.randn(1536) / 1536**0.5, []
+    group.output.register_forward_pre_hook(lambda module, inputs: hidden.append(inputs[0].detach()))
     for _ in range(60):
         features = torch.randn(32, 1, 1536).relu().expand(-1, 5, -1)
         loss = (group(features)[:, 0] - features[:, 0] @ direction - 0.5 * torch.randn(32)).abs().mean()
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-    return float((torch.stack(seen[-10:]).view(-1, 64, 3) > 0).any(0).any(1).float().mean())
+    return float((torch.stack(hidden[-10:]).view(-1, 64, 3) > 0).any(0).any(1).float().mean())
 
 
 def test_a_layer_norm_keeps_half_of_the_nodes_over_many_positive_features_alive() -> None:

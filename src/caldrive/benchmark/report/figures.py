@@ -47,8 +47,8 @@ def success_figure(runs: Sequence[BenchmarkRun]) -> str:
     places = list(dict.fromkeys(key[1:] for key in by_place))
     width = 0.8 / len(runs)
     for k, run in enumerate(runs):
-        left = (k - (len(runs) - 1) / 2) * width
-        cells_at = [(i + left, by_place.get((run.name, *place))) for i, place in enumerate(places)]
+        offset = (k - (len(runs) - 1) / 2) * width
+        cells_at = [(i + offset, by_place.get((run.name, *place))) for i, place in enumerate(places)]
         bars = [(x, cell) for x, cell in cells_at if cell is not None]
         percents = [cell.percent for _, cell in bars]
         error_bars = [[abs(cell.percent - cell.interval[side]) for _, cell in bars] for side in (0, 1)]

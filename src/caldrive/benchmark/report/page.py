@@ -93,10 +93,10 @@ def _infraction_kinds(failure: Failure) -> set[str]:
 def _chosen_stills(failed: Sequence[Failure], folders: dict[str, Path]) -> list[Sequence[Path]]:
     """For each failure the stills to show, MAX_STILLS in all: who broke a rule goes before who only took too long."""
     chosen: list[Sequence[Path]] = [()] * len(failed)
-    left = MAX_STILLS
+    remaining = MAX_STILLS
     for k in sorted(range(len(failed)), key=lambda k: not failed[k].result.episode.infractions):
-        chosen[k] = still_paths(folders[failed[k].run], failed[k].result.trial.key)[:left]
-        left -= len(chosen[k])
+        chosen[k] = still_paths(folders[failed[k].run], failed[k].result.trial.key)[:remaining]
+        remaining -= len(chosen[k])
     return chosen
 
 

@@ -61,7 +61,7 @@ def _success(runs: Sequence[BenchmarkRun]) -> Table:
         ours = [value for run in runs for value in _cell_texts(by_place.get((run.name, condition, task)))]
         published = [success(system, condition, task) for system in SYSTEMS]
         rows.append((condition, task, *ours, *("" if value is None else str(value) for value in published)))
-    heads = [f"{run.name} {what}" for run in runs for what in ("%", "clean %", "route %", "score")]
+    heads = [f"{run.name} {metric}" for run in runs for metric in ("%", "clean %", "route %", "score")]
     text = (
         "Percent of the episodes that reached their goal in time, with Wilson's 95 % interval; percent that did so "
         "clean, without an infraction of their own fault; share of the routes covered; driving score of Leaderboard "
@@ -161,8 +161,8 @@ def _failure_causes(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for run in runs:
         for town in dict.fromkeys(result.trial.scenario.town for result in run.results):
-            here = [failure for failure in run.failures if failure.result.trial.scenario.town == town]
-            causes = [failure.cause for failure in here if failure.cause is not None]
+            in_town = [failure for failure in run.failures if failure.result.trial.scenario.town == town]
+            causes = [failure.cause for failure in in_town if failure.cause is not None]
             for (event, x, y, command), count in common_places(causes):
                 rows.append((run.name, Path(town).stem, event, f"({x}, {y})", command, str(count)))
     text = "What the car did wrong first in the episodes that missed their goal, and near which place."

@@ -18,21 +18,21 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from caldrive.affordances import SPECS
-from caldrive.datatypes import Command
+from caldrive.affordances import CONDITIONAL, SPECS
+from caldrive.perception.network.network import COMMANDS
 from caldrive.perception.targets import encode
 from caldrive.recordings.folder import joined
 from caldrive.recordings.reader import Episode
 from caldrive.recordings.writer import EpisodeError
 
-Ids = NDArray[np.int64]
-COMMAND_NUMBERS = {command.value: number for number, command in enumerate(Command)}
-NONE = -1  # number of the command that no frame has
+Ids = NDArray[np.int64]  # numbers of frames
+COMMAND_NUMBERS = {command.value: number for number, command in enumerate(COMMANDS)}
+NO_COMMAND = -1
 
 
-def _numbers(commands: NDArray[Any]) -> Ids:
-    """Commands (N,) as the network counts them."""
-    return np.array([COMMAND_NUMBERS.get(command, NONE) for command in commands], dtype=np.int64)
+def _command_numbers(commands: NDArray[Any]) -> Ids:
+    """Commands (N,) as the network counts them; NO_COMMAND where there is none."""
+    return np.array([COMMAND_NUMBERS.get(command, NO_COMMAND) for command in commands], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Batch:
 
 
 class Frames:
-    """The frames of some episodes, one after the other: labels, commands, images, the moment of its episode that each
-    frame belongs to, and where its stream begins.
+    """The frames of some episodes, one after the other: labels, commands, images, the time step of its episode that
+    each frame belongs to, and where its stream begins.
 
     A stream is what one camera saw of one episode without a gap. size: (height, width) of the images; images stay
     decoded in memory where they take at most cache_gb. Images raise EpisodeError where they have another size.
@@ -60,30 +60,32 @@ class Frames:
     def __init__(self, episodes: Sequence[Episode], size: tuple[int, int], cache_gb: float = 0.0) -> None:
         self.size, self.episodes = size, tuple(episodes)
         self.targets = {spec.name: encode(spec, self.column(spec.name)) for spec in SPECS}
-        self.command = _numbers(self.column("command"))
-        self.other_command = _numbers(self.column("other_command"))
-        self.other_targets = {s.name: encode(s, self.column(f"other_{s.name}")) for s in SPECS if s.conditional}
-        self.episode, self.moment = self.by_episode(range(len(episodes))), self.column("frame")
+        self.command = _command_numbers(self.column("command"))
+        self.alternative_command = _command_numbers(self.column("other_command"))
+        self.alternative_targets = {s.name: encode(s, self.column(f"other_{s.name}")) for s in CONDITIONAL}
+        self.episode, self.time_step = self.by_episode(range(len(episodes))), self.column("frame")
         self.stream_start = self._stream_starts()
-        self._where = [(episode, row) for episode in episodes for row in range(len(episode))]
-        self.has_semantics = all(e.semantics is not None for e in episodes)
+        self._sources = [(episode, row) for episode in episodes for row in range(len(episode))]
+        self.has_semantics = all(episode.semantics is not None for episode in episodes)
         self._pool = ThreadPoolExecutor(2)
         self._cache: NDArray[np.uint8] | None = None
         if len(self) * size[0] * size[1] * 3 <= cache_gb * 1e9:
             self._cache = self.images(np.arange(len(self)))
 
     def __len__(self) -> int:
-        return len(self._where)
+        return len(self._sources)
 
     @cached_property
     def digest(self) -> str:
         """Tells these episodes, their labels and images from others; other images have JPEGs of other lengths."""
-        found = hashlib.sha256(repr([(e.key, len(e)) for e in self.episodes]).encode())
-        for blobs in (one for e in self.episodes for one in (e.jpegs, e.semantics or ())):
-            found.update(np.array([len(blob) for blob in blobs]).tobytes())
-        for values in (self.command, self.other_command, *self.targets.values(), *self.other_targets.values()):
-            found.update(np.asarray(values).tobytes())
-        return found.hexdigest()[:16]
+        digest = hashlib.sha256(repr([(episode.key, len(episode)) for episode in self.episodes]).encode())
+        for episode in self.episodes:
+            for blobs in (episode.jpegs, episode.semantics or ()):
+                digest.update(np.array([len(blob) for blob in blobs]).tobytes())
+        targets = (*self.targets.values(), *self.alternative_targets.values())
+        for values in (self.command, self.alternative_command, *targets):
+            digest.update(np.asarray(values).tobytes())
+        return digest.hexdigest()[:16]
 
     def column(self, name: str) -> NDArray[Any]:
         """A column (N,) of the recording."""
@@ -91,26 +93,18 @@ class Frames:
 
     def by_episode(self, values: Iterable[Any]) -> NDArray[Any]:
         """For each frame (N,) what its episode has of these, one for each episode."""
-        return np.repeat(list(values), [len(e) for e in self.episodes])
+        return np.repeat(list(values), [len(episode) for episode in self.episodes])
 
     def _stream_starts(self) -> Ids:
         """For each frame the number of its stream's first one."""
         camera = self.column("camera")
-        follows = (np.diff(self.episode) == 0) & (np.diff(camera) == 0) & (np.diff(self.moment) == 1)
+        follows = (np.diff(self.episode) == 0) & (np.diff(camera) == 0) & (np.diff(self.time_step) == 1)
         first = np.concatenate(([True], ~follows))
         return np.maximum.accumulate(np.where(first, np.arange(len(first)), 0))
 
-    def _decode(self, i: int) -> NDArray[np.uint8]:
-        episode, row = self._where[i]
-        image = episode.image(row)
-        if image.shape[:2] != self.size:
-            found, wanted = (f"{w} x {h}" for h, w in (image.shape[:2], self.size))
-            raise EpisodeError(f"{episode.path} has images of {found}, the network takes {wanted}: record at that size")
-        return image
-
     def source(self, i: int) -> tuple[Episode, int]:
         """The episode and the row that frame i comes from."""
-        return self._where[i]
+        return self._sources[i]
 
     def images(self, ids: Ids) -> NDArray[np.uint8]:
         """Images (N, H, W, 3) of frames by number."""
@@ -121,12 +115,29 @@ class Frames:
             slot[:] = image
         return images
 
+    def _decode(self, i: int) -> NDArray[np.uint8]:
+        episode, row = self._sources[i]
+        image = episode.image(row)
+        if image.shape[:2] != self.size:
+            recorded, wanted = (f"{w} x {h}" for h, w in (image.shape[:2], self.size))
+            raise EpisodeError(
+                f"found images of {recorded} in {episode.path}, wanted {wanted} for the network: record at that size"
+            )
+        return image
+
     def semantics(self, ids: Ids) -> NDArray[np.uint8] | None:
         """Semantic images (N, H, W) of frames by number, where all episodes have them."""
         if not self.has_semantics:
             return None
-        chosen = (self._where[i] for i in ids.tolist())
-        return np.stack(list(self._pool.map(lambda where: where[0].semantic(where[1], self.size), chosen)))
+        sources = (self._sources[i] for i in ids.tolist())
+        return np.stack(list(self._pool.map(lambda source: source[0].semantic(source[1], self.size), sources)))
+
+    def window_starts(self, window: int) -> Ids:
+        """All frames that begin a window."""
+        last = np.arange(len(self)) + window - 1
+        inside = last < len(self)
+        inside[inside] &= self.stream_start[last[inside]] == self.stream_start[: len(self)][inside]
+        return np.flatnonzero(inside)
 
     def windows(self, starts: Ids, window: int, context: int) -> Ids:
         """Frames (B, context + window) of the windows whose first frames with a loss are `starts`; before a stream's
@@ -134,24 +145,28 @@ class Frames:
         ids: Ids = np.maximum(starts[:, None] + np.arange(-context, window), self.stream_start[starts][:, None])
         return ids
 
-    def lessons(self, ids: Ids, other: NDArray[np.bool_] | None = None) -> tuple[Tensor, dict[str, Tensor]]:
-        """Commands (B, S) and targets (B * S,) of frames (B, S); other (B,): where another command is given wherever
-        that could be."""
+    def commands_and_targets(
+        self, ids: Ids, alternative: NDArray[np.bool_] | None = None
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Commands (B, S) and targets (B * S,) of frames (B, S).
+
+        alternative (B,): windows that are seen under the alternative command, wherever one could be given.
+        """
         command, targets = self.command[ids], {name: target[ids.ravel()] for name, target in self.targets.items()}
-        if other is not None:
-            turned = other[:, None] & (self.other_command[ids] != NONE)
-            command = np.where(turned, self.other_command[ids], command)
-            chosen = torch.from_numpy(turned.ravel())
-            for name, target in self.other_targets.items():
-                targets[name] = torch.where(chosen, target[ids.ravel()], targets[name])
+        if alternative is not None:
+            exchanged = alternative[:, None] & (self.alternative_command[ids] != NO_COMMAND)
+            command = np.where(exchanged, self.alternative_command[ids], command)
+            mask = torch.from_numpy(exchanged.ravel())
+            for name, target in self.alternative_targets.items():
+                targets[name] = torch.where(mask, target[ids.ravel()], targets[name])
         return torch.from_numpy(command), targets
 
-    def batch(self, starts: Ids, window: int, context: int, other: NDArray[np.bool_] | None = None) -> Batch:
+    def batch(self, starts: Ids, window: int, context: int, alternative: NDArray[np.bool_] | None = None) -> Batch:
         """The windows whose first frames with a loss are `starts`; all of them must lie `window` frames before their
-        stream's end. other: see `lessons`."""
+        stream's end. alternative: as in `commands_and_targets`."""
         ids = self.windows(starts, window, context)
         unique, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
-        command, targets = self.lessons(ids[:, context:], other)
+        command, targets = self.commands_and_targets(ids[:, context:], alternative)
         return Batch(
             images=self.images(unique),
             semantics=self.semantics(unique),
@@ -160,10 +175,3 @@ class Frames:
             command=command,
             targets=targets,
         )
-
-    def starts(self, window: int) -> Ids:
-        """All frames that begin a window."""
-        last = np.arange(len(self)) + window - 1
-        inside = last < len(self)
-        inside[inside] &= self.stream_start[last[inside]] == self.stream_start[: len(self)][inside]
-        return np.flatnonzero(inside)

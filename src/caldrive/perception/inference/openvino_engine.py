@@ -1,4 +1,4 @@
-"""A finished network at the wheel through OpenVINO: the backbone in 8-bit integers, the task blocks in 32 bits.
+"""A finished network driving through OpenVINO: the backbone in 8-bit integers, the task blocks in 32 bits.
 
 On a CPU with VNNI the backbone is four times as fast as torch in 32 bits, on older ones twice. Post-training
 quantization (Jacob et al. 2018): weights have a scale for each channel that they give; what enters a convolution has
@@ -20,8 +20,8 @@ from torch import Tensor, nn
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.network import COMMANDS, Network, NodeGroup, TaskBlock
 
-# OpenVINO's converter, which nobody needs here, tells its makers over the network when it is imported; without it the
-# rest works.
+# OpenVINO's converter, which nobody needs here, tells its makers over the network when it is imported. None in its
+# place keeps it out, and the rest works without it.
 sys.modules.setdefault("openvino.tools.ovc", None)  # type: ignore[arg-type]
 import openvino as ov  # noqa: E402
 from openvino import opset13  # noqa: E402
@@ -40,8 +40,8 @@ def compiled(outputs: list[Any], parameter: Any, threads: int) -> ov.InferReques
 
 def constant(values: Tensor, *shape: int) -> Any:
     """Trained values in 32 bits, in another shape where one is given."""
-    found: NDArray[np.float32] = values.detach().float().numpy()
-    return ops.constant(np.ascontiguousarray(found.reshape(shape) if shape else found))
+    array: NDArray[np.float32] = values.detach().float().numpy()
+    return ops.constant(np.ascontiguousarray(array.reshape(shape) if shape else array))
 
 
 def normalised(x: Any, norm: nn.Module, *shape: int) -> Any:
@@ -59,23 +59,25 @@ def normalised(x: Any, norm: nn.Module, *shape: int) -> Any:
     return ops.add(ops.multiply(x, constant(gain, *shape)), constant(shift, *shape))
 
 
-def _rounded(x: Any, top: Any, signed: bool, levels: int) -> Any:
-    """x rounded to that many levels in [-top, top], or in [0, top]."""
-    low = -top * (levels // 2) / ((levels - 1) // 2) if signed else 0.0 * top
-    return ops.fake_quantize(x, np.float32(low), np.float32(top), np.float32(low), np.float32(top), levels)
+def _quantized(x: Any, high: Any, signed: bool, levels: int) -> Any:
+    """x rounded to that many levels in [-high, high], or in [0, high]."""
+    low = -high * (levels // 2) / ((levels - 1) // 2) if signed else 0.0 * high
+    return ops.fake_quantize(x, np.float32(low), np.float32(high), np.float32(low), np.float32(high), levels)
 
 
-def _convolution(x: Any, conv: nn.Module, top: float, signed: bool, bits: int) -> Any:
+def _convolution(x: Any, conv: nn.Module, high: float, signed: bool, bits: int) -> Any:
+    """A convolution in integers. high: the largest size of what enters; signed: whether that is also negative."""
     assert isinstance(conv, nn.Conv2d)
     weight = conv.weight.detach().float().numpy()
-    tops = np.abs(weight).max(axis=(1, 2, 3), keepdims=True) * 2 ** (8 - bits)  # of 8 bits only the lower ones are used
-    weight = _rounded(ops.constant(np.ascontiguousarray(weight)), np.maximum(tops, 1e-9), True, 255)
-    x = ops.convolution(_rounded(x, np.float32(top), signed, 256), weight, [1, 1], [1, 1], [1, 1], [1, 1])
+    highs = np.abs(weight).max(axis=(1, 2, 3), keepdims=True) * 2 ** (8 - bits)  # of 8 bits only the lower are used
+    weight = _quantized(ops.constant(np.ascontiguousarray(weight)), np.maximum(highs, 1e-9), signed=True, levels=255)
+    x = _quantized(x, np.float32(high), signed, levels=256)
+    x = ops.convolution(x, weight, strides=[1, 1], pads_begin=[1, 1], pads_end=[1, 1], dilations=[1, 1])
     assert conv.bias is not None
     return ops.add(x, constant(conv.bias, 1, -1, 1, 1))
 
 
-def _graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
+def _backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
     """The backbone's features (1, F) of an image (1, 3, H, W); its fake quantizations become integers when it is
     compiled."""
     x = image
@@ -87,34 +89,35 @@ def _graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -
                 x = ops.relu(x)
             x = _convolution(x, conv, ranges[number], signed=number == 0, bits=bits)
             number += 1
-        x = ops.max_pool(x, [2, 2], [1, 1], [0, 0], [0, 0], [2, 2], "floor").output(0)
-        x = ops.relu(normalised(x, norm, 1, -1, 1, 1))
+        x = ops.max_pool(x, strides=[2, 2], dilations=[1, 1], pads_begin=[0, 0], pads_end=[0, 0], kernel_shape=[2, 2])
+        x = ops.relu(normalised(x.output(0), norm, 1, -1, 1, 1))
     return ops.reshape(x, ops.constant([1, -1]), False)
 
 
 class Int8Backbone:
-    """A trained backbone on the CPU for images of one size. ranges: by `input_ranges`; threads: how many it may use;
-    bits: of a weight, 7 for a processor that adds pairs of products in 16 bits.
+    """A trained backbone on the CPU for images of one size (height, width). ranges: by `input_ranges`; threads: how
+    many it may use; bits: of a weight, 7 for a processor that adds pairs of products in 16 bits.
 
     Raises ValueError where the ranges are not this backbone's, or where they or its weights are not numbers.
     """
 
     def __init__(
-        self, backbone: Backbone, ranges: Sequence[float], height: int, width: int, threads: int, bits: int = 8
+        self, backbone: Backbone, ranges: Sequence[float], size: tuple[int, int], *, threads: int, bits: int = 8
     ) -> None:
         if len(ranges) != len(backbone.convolutions()):
             raise ValueError(
-                f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network anew"
+                f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network again"
             )
-        if not all(bool(torch.as_tensor(one).isfinite().all()) for one in (ranges, *backbone.state_dict().values())):
-            raise ValueError("found weights that are not numbers, which integers would hide: train the network anew")
-        image = ops.parameter([1, 3, height, width], np.float32)
-        self._request = compiled([_graph(image, backbone, ranges, bits)], image, threads)
+        numbers = (torch.as_tensor(ranges), *backbone.state_dict().values())
+        if not all(bool(tensor.isfinite().all()) for tensor in numbers):
+            raise ValueError("found weights that are not numbers, wanted a trained network: train it again")
+        image = ops.parameter([1, 3, *size], np.float32)
+        self._request = compiled([_backbone_graph(image, backbone, ranges, bits)], image, threads)
 
     def __call__(self, images: Tensor) -> Tensor:
         """Normalised images (N, 3, H, W), which pass one at a time, to features (N, F)."""
-        found = [self._request.infer([image], share_inputs=True)[0] for image in images.numpy()[:, None]]
-        return torch.from_numpy(np.concatenate(found))
+        features = [self._request.infer([image], share_inputs=True)[0] for image in images.numpy()[:, None]]
+        return torch.from_numpy(np.concatenate(features))
 
 
 LAYERS = ("dense", "tconv")  # those that have a graph here
@@ -125,47 +128,47 @@ def _linear(x: Any, layer: nn.Module) -> Any:
     return ops.add(ops.matmul(x, constant(layer.weight), False, True), constant(layer.bias, 1, -1))
 
 
-def _taken(sequence: Any, rows: list[int]) -> Any:
+def _gathered(sequence: Any, rows: list[int]) -> Any:
     """These rows of a sequence (T, F)."""
     return ops.gather(sequence, ops.constant(np.array(rows)), ops.constant(0))
 
 
-def _outputs(sequence: Any, block: TaskBlock, group: NodeGroup, span: int) -> Any:
+def _block_graph(sequence: Any, block: TaskBlock, group: NodeGroup, span: int) -> Any:
     """A group of nodes of a block, from the last `span` frames' features (span, F) to its outputs (1, K)."""
     config, steps = block.config, group.steps
     frames = [span - 1 - config.dilation * back for back in range(config.length - 1, -1, -1)]
-    under = [_taken(sequence, frames[k : len(frames) - steps + 1 + k]) for k in range(steps)]
+    windows = [_gathered(sequence, frames[k : len(frames) - steps + 1 + k]) for k in range(steps)]  # under the kernel
     if group.kind == "tconv":  # each feature's values lie side by side
-        under = [ops.transpose(one, ops.constant([1, 0])) for one in under]
-    rows = ops.concat([ops.reshape(one, ops.constant([1, -1]), False) for one in under], 0)
-    hidden = ops.relu(normalised(_linear(rows, group.layer), group.norm, 1, -1))  # (steps, nodes)
+        windows = [ops.transpose(window, ops.constant([1, 0])) for window in windows]
+    flat_windows = ops.concat([ops.reshape(window, ops.constant([1, -1]), False) for window in windows], 0)
+    hidden = ops.relu(normalised(_linear(flat_windows, group.layer), group.norm, 1, -1))  # (steps, nodes)
     flat = ops.reshape(ops.transpose(hidden, ops.constant([1, 0])), ops.constant([1, -1]), False)
     return _linear(flat, group.output)
 
 
-class BlockGraphs:
-    """The blocks of a trained network at the wheel; for each command a graph with the groups that are active then.
+class OpenVINOBlocks:
+    """The task blocks of a trained network when driving; for each command a graph with the groups that are active then.
 
     threads: how many it may use. Raises ValueError for a block that has no graph here, see `LAYERS`.
     """
 
     def __init__(self, network: Network, threads: int) -> None:
         blocks = network.task_blocks()
-        if others := {block.config.layer for block in blocks.values()} - set(LAYERS):
-            raise ValueError(f"found task blocks of {', '.join(sorted(others))}, wanted {' or '.join(LAYERS)}")
+        if unknown := {block.config.layer for block in blocks.values()} - set(LAYERS):
+            layers = ", ".join(sorted(unknown))
+            raise ValueError(f"found task blocks of {layers}, wanted {' or '.join(LAYERS)}: type --precision fp32")
         self._names = list(blocks)
         self._requests = [self._compiled(network, command, threads) for command in range(len(COMMANDS))]
 
     @staticmethod
     def _compiled(network: Network, command: int, threads: int) -> Any:
-        size = network.config.image_height, network.config.image_width
-        sequence = ops.parameter([network.span, network.backbone.n_features(*size)], np.float32)
+        n_features = network.backbone.n_features(*network.config.image_size)
+        sequence = ops.parameter([network.span, n_features], np.float32)
         blocks = network.task_blocks().values()
-        return compiled(
-            [_outputs(sequence, block, block.group(command), network.span) for block in blocks], sequence, threads
-        )
+        outputs = [_block_graph(sequence, block, block.group(command), network.span) for block in blocks]
+        return compiled(outputs, sequence, threads)
 
     def __call__(self, history: Tensor, command: Tensor) -> dict[str, Tensor]:
         """Features (1, span, F) and a command (1,) to outputs (1, K), as the network does."""
-        found = self._requests[int(command[0])].infer([history[0].contiguous().numpy()], share_inputs=True)
-        return {name: torch.from_numpy(found[k].copy()) for k, name in enumerate(self._names)}
+        outputs = self._requests[int(command[0])].infer([history[0].contiguous().numpy()], share_inputs=True)
+        return {name: torch.from_numpy(outputs[k].copy()) for k, name in enumerate(self._names)}

@@ -1,22 +1,19 @@
-"""The network at the wheel: one image in, six affordances out, each frame through the backbone once."""
+"""The network when driving: one image in, the affordances out, each frame through the backbone once."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from caldrive.datatypes import Affordances, Image, Observation
+from caldrive.datatypes import Affordances, Observation
 from caldrive.interfaces import BadImage
-from caldrive.perception.images import normalise, to_float
-from caldrive.perception.inference.engines import INTEGERS, blocks_in, driving_precision, features_in
+from caldrive.perception.images import check_image, normalise, to_float
+from caldrive.perception.inference.engines import INTEGERS, backbone_engine, blocks_engine, driving_precision
 from caldrive.perception.network.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.network.network import COMMANDS, Network
 from caldrive.perception.targets import decode
-
-DARK, LIT = 3, 0.01  # of a working camera's image at least this share is brighter than that, even by night
 
 
 class NetworkPerception:
@@ -29,14 +26,14 @@ class NetworkPerception:
 
     def __init__(self, network: Network | Path | str, precision: str = "auto", threads: int | None = None) -> None:
         if isinstance(network, Network):
-            network, info = network, CheckpointInfo(network.config)
+            info = CheckpointInfo(network.config)
         else:
             network, info = load_network(network)
         self.network, precision = network.eval(), driving_precision(precision, info)
         if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
             torch.set_num_threads(1 if precision in INTEGERS else threads)
-        self._features = features_in(precision, network, info, threads)
-        self._blocks = blocks_in(precision, network, threads)
+        self._backbone = backbone_engine(precision, network, info, threads)
+        self._blocks = blocks_engine(precision, network, threads)
         self._history: Tensor | None = None  # (1, span, F)
 
     def reset(self) -> None:
@@ -46,25 +43,13 @@ class NetworkPerception:
     @torch.inference_mode()
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
-        self._check(observation.image)
-        feature = self._features(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
-        if not bool(feature.isfinite().all()):
+        check_image(observation.image, self.network.config.image_size)
+        features = self._backbone(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
+        if not bool(features.isfinite().all()):
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:
-            self._history = feature.expand(-1, self.network.span, -1)
+            self._history = features.expand(-1, self.network.span, -1)
         else:
-            self._history = torch.cat((self._history[:, 1:], feature), dim=1)
+            self._history = torch.cat((self._history[:, 1:], features), dim=1)
         command = torch.tensor([COMMANDS.index(observation.command)])
         return decode(self._blocks(self._history, command))
-
-    def _check(self, image: Image) -> None:
-        config = self.network.config
-        wanted = (config.image_height, config.image_width, 3)
-        if not isinstance(image, np.ndarray):
-            raise BadImage(f"the image is {image}, the network takes {wanted} of uint8: brake, and look at the camera")
-        if image.shape != wanted or image.dtype != np.uint8:
-            raise BadImage(
-                f"the image is {image.shape} of {image.dtype}, the network takes {wanted} of uint8: set the camera so"
-            )
-        if np.count_nonzero(image > DARK) < LIT * image.size:
-            raise BadImage("the image is black: brake, and look at the camera")

@@ -12,31 +12,12 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 from torch.nn.functional import max_pool2d
 
+# Of VGG16's five stages: channels, and convolutions.
 CHANNELS = (64, 128, 256, 512, 512)
-
 DEPTHS = (2, 2, 3, 3, 3)
 
 # Where a torchvision VGG16 keeps its convolutions.
 IMAGENET_LAYERS = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
-
-
-def imagenet_file() -> Path:
-    """VGG16's weights in torch.hub's cache. Raises ValueError where there are none."""
-    folder = Path(torch.hub.get_dir()) / "checkpoints"
-    found = sorted(folder.glob("vgg16-*.pth"))
-    if not found:
-        raise ValueError(f"found no vgg16-*.pth in {folder}: put VGG16's state dict there, or type --imagenet FILE")
-    return found[0]
-
-
-def _read_state(path: Path) -> dict[str, Tensor]:
-    try:
-        if path.suffix == ".pth":  # weights_only builds tensors and plain values, and runs nothing
-            state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
-            return state
-        return load_file(path)
-    except (OSError, EOFError, SafetensorError, UnpicklingError, RuntimeError) as error:
-        raise ValueError(f"{path} is missing or no state dict of tensors: give a .safetensors or .pth file") from error
 
 
 class Backbone(nn.Module):
@@ -77,14 +58,14 @@ class Backbone(nn.Module):
 
     def maps(self, images: Tensor) -> list[Tensor]:
         """What each of the five stages makes of images (N, 3, H, W): the first one (N, C, H // 2, W // 2)."""
-        x, found = images, []
+        x, maps = images, []
         for stage, norm in zip(self.stages, self.norms, strict=True):
             assert isinstance(stage, nn.ModuleList)
             for conv in stage[:-1]:
                 x = conv(x).relu_()
             x = norm(max_pool2d(stage[-1](x), 2)).relu_()
-            found.append(x)
-        return found
+            maps.append(x)
+        return maps
 
     def load_imagenet(self, path: Path | str) -> None:
         """Take the convolutions of a torchvision-style VGG16 (features.N.weight, features.N.bias) from a safetensors
@@ -94,7 +75,8 @@ class Backbone(nn.Module):
         """
         if self.width != 1.0:
             raise ValueError(
-                f"ImageNet weights fit VGG16 at width 1, this backbone has {self.width:g}: type --preset paper"
+                f"found a backbone of width {self.width:g}, wanted VGG16's of width 1 for ImageNet's weights: "
+                "type --preset paper, or --imagenet none"
             )
         state = _read_state(Path(path))
         for number, conv in zip(IMAGENET_LAYERS, self.convolutions(), strict=True):
@@ -103,5 +85,20 @@ class Backbone(nn.Module):
                 shape = tuple(state[name].shape) if name in state else None
                 if shape != tuple(parameter.shape):
                     wanted = tuple(parameter.shape)
-                    raise ValueError(f"{path} has {name} of shape {shape}, VGG16 has {wanted}: give VGG16's state dict")
+                    raise ValueError(
+                        f"found {name} of shape {shape} in {path}, wanted VGG16's of {wanted}: give VGG16's state dict"
+                    )
                 parameter.data.copy_(state[name])
+
+
+def _read_state(path: Path) -> dict[str, Tensor]:
+    try:
+        if path.suffix == ".pth":  # weights_only builds tensors and plain values, and runs nothing
+            state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
+            return state
+        return load_file(path)
+    except (OSError, EOFError, SafetensorError, UnpicklingError, RuntimeError) as error:
+        raise ValueError(
+            f"found that {path} is missing or no state dict of tensors, wanted VGG16's: "
+            "give a .safetensors or .pth file"
+        ) from error

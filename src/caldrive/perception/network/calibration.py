@@ -1,4 +1,4 @@
-"""What is put right when a training ends: probabilities, as the rare was made frequent, and the ranges of 8 bits."""
+"""Calibration of a trained network: of its probabilities, as rare classes were drawn often, and for 8-bit integers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.network import Network
 
-AT_ONCE = 16  # images
+IMAGES_A_PASS = 16
 Counts = Mapping[str, Sequence[int]]  # frames of each class (K,), by discrete affordance
 
 
@@ -22,21 +22,22 @@ def calibrated(network: Network, counts: Counts) -> Network:
     expects them alike. Moving each class's last bias by the logarithm of its share of the frames takes that back;
     about, as frames are drawn by the rarest of their labels, not by each. counts: of the recording.
     """
-    return _moved(network, counts, 1.0)
+    return _with_prior(network, counts, 1.0)
 
 
 def uncalibrated(network: Network, counts: Counts) -> Network:
     """A copy of a calibrated network as it was before, to be trained further. counts: those of its own recording."""
-    return _moved(network, counts, -1.0)
+    return _with_prior(network, counts, -1.0)
 
 
-def _moved(network: Network, counts: Counts, sign: float) -> Network:
+def _with_prior(network: Network, counts: Counts, sign: float) -> Network:
+    """A copy whose biases have the logarithms of the classes' shares added (sign 1) or taken away (-1)."""
     network = copy.deepcopy(network)
     for name, count in counts.items():
         frames = torch.tensor(count, dtype=torch.float64)
-        expected = (frames / frames.sum()).clamp(min=1e-9).log()  # what never occurs is not expected
+        prior = (frames / frames.sum()).clamp(min=1e-9).log()  # what never occurs is not expected
         bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
-        bias.data += sign * (expected - expected[0]).to(bias.device)
+        bias.data += sign * (prior - prior[0]).to(bias.device)
     return network
 
 
@@ -46,17 +47,17 @@ def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
 
     Nothing is clipped, though that would make the steps of 8 bits finer: the few largest values are lamps and signs.
     """
-    found: list[list[float]] = []
+    sizes: list[list[float]] = []  # of each pass, by convolution
 
     def note(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
-        found[-1].append(float(inputs[0].abs().max()))
+        sizes[-1].append(float(inputs[0].abs().max()))
 
     hooks = [conv.register_forward_pre_hook(note) for conv in backbone.convolutions()]
     try:
-        for part in torch.split(images, AT_ONCE):
-            found.append([])
+        for part in torch.split(images, IMAGES_A_PASS):
+            sizes.append([])
             backbone(part)
     finally:
         for hook in hooks:
             hook.remove()
-    return tuple(map(max, zip(*found, strict=True)))
+    return tuple(map(max, zip(*sizes, strict=True)))

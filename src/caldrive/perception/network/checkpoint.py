@@ -1,5 +1,7 @@
-"""A trained network on disk: one safetensors file, with all that belongs to it as JSON in its header. Nothing is
-unpickled."""
+"""A trained network on disk: one safetensors file, with all that belongs to it as JSON in its header.
+
+Nothing is unpickled, so a file from a stranger can do no harm.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +17,17 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from caldrive.affordances import SPECS, describe
+from caldrive.affordances import DISCRETE, describe
 from caldrive.files import as_type, read_json, write_whole
-from caldrive.perception.network.config import PerceptionConfig
+from caldrive.perception.network.config import NetworkConfig
 from caldrive.perception.network.network import Network
 
 FORMAT_VERSION = 2
-KEY = "caldrive"
+KEY = "caldrive"  # of the JSON in safetensors' metadata
 
 
 class DataSummary(TypedDict, total=False):
-    """What a checkpoint remembers of its data. train_classes: frames of each class by discrete affordance;
+    """What a checkpoint says of its data. train_classes: frames of each class by discrete affordance;
     validation_episodes: keys of those kept for validation."""
 
     train_frames: int
@@ -40,12 +42,13 @@ class CheckpointError(ValueError):
 
 @dataclass(frozen=True)
 class CheckpointInfo:
-    """What is known of a trained network: its configuration, its data, its validation metrics, how it was trained, and
-    the range of what enters each of its convolutions (empty where nobody looked).
+    """What is known of a trained network: its configuration, its data, its validation metrics, the settings of its
+    training, and the range of what enters each of its convolutions (empty where nobody looked).
 
-    The metrics are those in the precision of the training, not in the 8 bits in which it may drive."""
+    The metrics are those in the precision of the training, not in the 8 bits in which it may drive.
+    """
 
-    config: PerceptionConfig
+    config: NetworkConfig
     data: DataSummary = field(default_factory=DataSummary)
     metrics: dict[str, float] = field(default_factory=dict)
     training: dict[str, Any] = field(default_factory=dict)
@@ -64,7 +67,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Tensors and header of a file by `write_tensors`. Raises CheckpointError where it is missing, damaged or
     foreign."""
     if not path.is_file():
-        raise CheckpointError(f"there is no checkpoint {path}: look for the name, or make one with `caldrive train`")
+        raise CheckpointError(f"found no file {path}, wanted a network: check the name, or type caldrive train")
     content = path.read_bytes()
     try:
         tensors = load(content)
@@ -72,13 +75,16 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__") or {}
         header = read_json(metadata[KEY], dict[str, Any]) if KEY in metadata else None
     except (SafetensorError, ValueError, struct.error) as error:
-        raise CheckpointError(f"{path} is damaged or no safetensors file: copy it again or train anew") from error
-    if header is None:
-        raise CheckpointError(f"{path} holds tensors, but no network of caldrive: give a file made by `caldrive train`")
-    if header.get("version") != FORMAT_VERSION:
-        found = header.get("version")
         raise CheckpointError(
-            f"{path} has format {found}, this caldrive reads {FORMAT_VERSION}: train the network anew"
+            f"found that {path} is damaged or no safetensors file, wanted a whole one: copy it again, or train again"
+        ) from error
+    if header is None:
+        raise CheckpointError(
+            f"found tensors in {path}, but no network of caldrive, wanted one: give a file made by caldrive train"
+        )
+    if header.get("version") != FORMAT_VERSION:
+        raise CheckpointError(
+            f"found format {header.get('version')} in {path}, wanted {FORMAT_VERSION}: train the network again"
         )
     return tensors, header
 
@@ -108,17 +114,19 @@ def _read_network(path: Path) -> tuple[dict[str, Tensor], CheckpointInfo]:
     tensors, header = read_tensors(path)
     if header.get("kind") != "network":
         raise CheckpointError(
-            f"{path} is part of a training, no finished network: give the model.safetensors that it makes"
+            f"found part of a training in {path}, wanted a finished network: give its model.safetensors"
         )
     if header.get("specs") != json.loads(json.dumps(describe())):
         raise CheckpointError(
-            f"{path} was trained for other affordances than this caldrive's six: train the network anew"
+            f"found in {path} a network for other affordances, wanted those of this caldrive: train the network again"
         )
     try:
-        known = {f.name: header[f.name] for f in fields(CheckpointInfo) if f.name in header}
-        return tensors, as_type(known, CheckpointInfo)
+        names = {part.name for part in fields(CheckpointInfo)}
+        return tensors, as_type({name: header[name] for name in header.keys() & names}, CheckpointInfo)
     except (KeyError, TypeError, ValueError) as error:
-        raise CheckpointError(f"{path} has a header that cannot be read ({error}): train the network anew") from error
+        raise CheckpointError(
+            f"found in {path} a header that cannot be read ({error}), wanted a training's: train the network again"
+        ) from error
 
 
 def read_info(path: Path | str) -> CheckpointInfo:
@@ -136,23 +144,23 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
         network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise CheckpointError(
-            f"the weights in {path} do not fit its own configuration: train the network anew"
+            f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
         ) from error
-    if wrong := _wrong(network, info):
-        raise CheckpointError(f"{path} has {wrong}: train the network anew")
+    if fault := _fault(network, info):
+        raise CheckpointError(f"found in {path} {fault}, wanted a trained network: train it again")
     return network.eval(), info
 
 
-def _wrong(network: Network, info: CheckpointInfo) -> str:
+def _fault(network: Network, info: CheckpointInfo) -> str:
     """What is not as a training leaves it, or nothing."""
     state = network.state_dict()
     if not all(bool(value.isfinite().all()) for value in state.values()):
         return "weights that are not numbers"
     if any(bool((value < 0).any()) for name, value in state.items() if name.endswith("running_var")):
         return "variances less than 0"
-    if not all(0 < one < math.inf for one in info.ranges):
+    if not all(0 < size < math.inf for size in info.ranges):
         return "ranges of integers that are not more than 0"
-    outputs = {spec.name: spec.outputs for spec in SPECS if spec.discrete}
+    outputs = {spec.name: spec.outputs for spec in DISCRETE}
     counts = info.data.get("train_classes", {})
     if any(len(count) != outputs.get(name) or min(count) < 0 or not sum(count) for name, count in counts.items()):
         return "counts of other classes than this caldrive's"

@@ -1,38 +1,56 @@
-"""Settings of the network and of its training, and their presets."""
+"""Settings of the network: its backbone, a task block for each affordance, and the presets.
+
+A checkpoint's header keeps them under the same names, so a field that is renamed makes older checkpoints unreadable.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from caldrive.checks import MOST_PIXELS
+
+Layer = Literal["dense", "lstm", "gru", "tconv"]
+Norm = Literal["batch", "layer", "none"]
 
 MOST_FRAMES, MOST_NODES, MOST_WIDTH = 1000, 10_000, 10.0  # more than anyone builds
 
 
 @dataclass(frozen=True)
 class BlockConfig:
-    """A task block: kind of layer (dense, lstm, gru or tconv), its nodes (for each command where the affordance is
-    conditional), dropout ratio, length of its sequence in frames, dilation (2: every other frame), and its norm.
+    """A task block: one affordance from the features of one frame, or of a sequence of frames."""
 
-    norm: batch; layer (over a sample's nodes), for conditional blocks, whose batch norm would see only the few samples
-    of a batch that have its command; or none, where a small network's nodes die one after the other: features are
-    never negative, and a few steps at its high rate push all of a node's sums below zero for good.
-    """
-
-    layer: str = "dense"
+    layer: Layer = "dense"
+    """Its layer; tconv is a temporal convolution."""
     nodes: int = 64
+    """Nodes of the layer; as many for each command where the affordance depends on the command."""
     dropout: float = 0.25
+    """Share of the nodes that dropout switches off in training."""
     length: int = 1
+    """Frames in its sequence. A block with more than one is temporal."""
     dilation: int = 1
-    norm: str = "batch"
+    """Distance between two frames of the sequence; 2 takes every other frame."""
+    norm: Norm = "batch"
+    """Norm after the layer: batch; layer, over a sample's nodes, for conditional blocks, as batch norm would see only
+    the few samples of a batch that have their command; or none. Without a norm the nodes of a small network die one by
+    one: features are never negative, and a few steps at its high rate push all of a node's sums below zero for good."""
 
     def __post_init__(self) -> None:
+        for name, kinds in (("layer", get_args(Layer)), ("norm", get_args(Norm))):
+            if getattr(self, name) not in kinds:
+                raise ValueError(f"found {name} {getattr(self, name)!r} of a task block, wanted {_either(kinds)}")
         within = 1 <= self.length <= MOST_FRAMES and 1 <= self.dilation <= MOST_FRAMES and 1 <= self.nodes <= MOST_NODES
         if not within or not 0 <= self.dropout < 1:
             raise ValueError(
-                f"{self} cannot be built: give 1 to {MOST_NODES} nodes, length and dilation from 1 to {MOST_FRAMES}, "
-                "and a dropout from 0 to less than 1"
+                f"found a task block of {self.nodes} nodes, dropout {self.dropout}, length {self.length} and dilation "
+                f"{self.dilation}, wanted 1 to {MOST_NODES} nodes, a dropout from 0 to less than 1, and length and "
+                f"dilation from 1 to {MOST_FRAMES}"
             )
+
+    @property
+    def temporal(self) -> bool:
+        """Whether it looks at more than one frame."""
+        return self.length > 1
 
     @property
     def span(self) -> int:
@@ -41,34 +59,52 @@ class BlockConfig:
 
 
 @dataclass(frozen=True)
-class PerceptionConfig:
-    """The network: image size in pixels, width of the convolutions as a share of VGG16's, batch norm in the backbone,
-    and one task block for each affordance. The default is the small network that is trained from scratch."""
+class NetworkConfig:
+    """The network. The default is the small one, which is trained from scratch."""
 
     image_width: int = 200
+    """Width of the images in pixels."""
     image_height: int = 88
+    """Height of the images in pixels."""
     width: float = 0.25
+    """Channels of the convolutions as a share of VGG16's."""
     batch_norm: bool = True
+    """Batch norm in the backbone, which a narrow network trained from scratch needs."""
     hazard_stop: BlockConfig = BlockConfig("tconv", 64, 0.25, length=5, dilation=2)
+    """Task block of the hazard stop."""
     red_light: BlockConfig = BlockConfig("dense", 64, 0.25)
+    """Task block of the red light."""
     speed_sign: BlockConfig = BlockConfig("dense", 64, 0.25)
+    """Task block of the speed sign."""
     vehicle_distance: BlockConfig = BlockConfig("dense", 64, 0.1)
+    """Task block of the distance to the vehicle ahead."""
     relative_angle: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
+    """Task block of the relative angle, with nodes for each command."""
     center_distance: BlockConfig = BlockConfig("tconv", 64, 0.0, length=5, dilation=2, norm="layer")
+    """Task block of the distance to the centre line, with nodes for each command."""
 
     def __post_init__(self) -> None:
         sides = self.image_width, self.image_height
         if not 0 < self.width <= MOST_WIDTH or not all(1 <= side <= MOST_PIXELS for side in sides):
             raise ValueError(
-                f"a network of width {self.width} for {sides[0]} x {sides[1]} pixels cannot be built: give more than 0 "
-                f"and up to {MOST_WIDTH:g} as its width, and 1 to {MOST_PIXELS} pixels a side"
+                f"found a network of width {self.width} for images of {sides[0]} x {sides[1]} pixels, wanted a width "
+                f"of more than 0 and at most {MOST_WIDTH:g}, and 1 to {MOST_PIXELS} pixels a side"
             )
 
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """(height, width) of the images in pixels."""
+        return self.image_height, self.image_width
 
-PERCEPTIONS = {
-    "small": PerceptionConfig(),
+
+def _either(words: tuple[str, ...]) -> str:
+    return f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+NETWORKS = {
+    "small": NetworkConfig(),
     # The best task blocks of the paper's supplement (table of best task block parameters) on VGG16 as it is.
-    "paper": PerceptionConfig(
+    "paper": NetworkConfig(
         image_width=320,
         image_height=144,
         width=1.0,

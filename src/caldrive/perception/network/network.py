@@ -8,7 +8,7 @@ from torch import Tensor, nn
 from caldrive.affordances import SPECS, AffordanceSpec
 from caldrive.datatypes import Command
 from caldrive.perception.network.backbone import Backbone
-from caldrive.perception.network.config import BlockConfig, PerceptionConfig
+from caldrive.perception.network.config import BlockConfig, NetworkConfig
 
 COMMANDS = tuple(Command)  # a command's number is its place here
 KERNEL = 3  # frames that a temporal convolution sees at once
@@ -32,7 +32,8 @@ class _LayerNorm(nn.LayerNorm):
         return super().forward(x.movedim(1, -1)).movedim(-1, 1)
 
 
-NORMS = {"batch": _SafeBatchNorm, "layer": _LayerNorm, "none": nn.Identity}
+RECURRENT: dict[str, type[nn.GRU] | type[nn.LSTM]] = {"gru": nn.GRU, "lstm": nn.LSTM}
+NORMS: dict[str, type[nn.Module]] = {"batch": _SafeBatchNorm, "layer": _LayerNorm, "none": nn.Identity}
 
 
 class NodeGroup(nn.Module):
@@ -50,18 +51,14 @@ class NodeGroup(nn.Module):
             self.steps = config.length - kernel + 1
             # One product over the frames that lie under the kernel: on a CPU much faster than a convolution this long.
             self.layer = nn.Linear(n_features * kernel, config.nodes)
-        elif config.layer in ("gru", "lstm"):
-            self.layer = {"gru": nn.GRU, "lstm": nn.LSTM}[config.layer](n_features, config.nodes, batch_first=True)
         else:
-            raise ValueError(f"a task block's layer is {config.layer!r}, but must be dense, lstm, gru or tconv")
-        if config.norm not in NORMS:
-            raise ValueError(f"a task block's norm is {config.norm!r}, but must be {', '.join(NORMS)}")
+            self.layer = RECURRENT[config.layer](n_features, config.nodes, batch_first=True)
         self.norm = NORMS[config.norm](config.nodes)
         self.dropout = nn.Dropout(config.dropout)
         self.output = nn.Linear(config.nodes * self.steps, n_outputs)
 
     def forward(self, sequence: Tensor) -> Tensor:
-        if self.kind in ("gru", "lstm"):
+        if self.kind in RECURRENT:
             hidden = self.norm(self.layer(sequence)[0][:, -1])  # (N, nodes)
         elif self.kind == "tconv":
             under = sequence.unfold(1, sequence.shape[1] - self.steps + 1, 1)  # (N, steps, F, kernel)
@@ -73,8 +70,8 @@ class NodeGroup(nn.Module):
 
 
 class TaskBlock(nn.Module):
-    """One affordance from the features. A conditional block has three groups of nodes, one for each command; a sample
-    passes the group of its command only, and so only that one receives its gradient."""
+    """One affordance from the features. A conditional block has a group of nodes for each command; a sample passes the
+    group of its command only, and so only that one receives its gradient."""
 
     def __init__(self, config: BlockConfig, spec: AffordanceSpec, n_features: int) -> None:
         super().__init__()
@@ -92,7 +89,7 @@ class TaskBlock(nn.Module):
     def forward(self, features: Tensor, command: Tensor) -> Tensor:
         """Features (B, T, F) and the commands (B, S) of the last S frames to outputs (B * S, outputs)."""
         sequence, command = self._sequences(features, command.shape[1]), command.flatten()
-        if len(self.groups) == 1 or len(command) == 1:  # at the wheel there is one frame and one command
+        if len(self.groups) == 1 or len(command) == 1:  # when driving there is one frame and one command
             result: Tensor = self.group(int(command[0]))(sequence)
             return result
         outputs = sequence.new_zeros(len(sequence), self.n_outputs)
@@ -115,23 +112,23 @@ class TaskBlock(nn.Module):
 
 
 class Network(nn.Module):
-    """The backbone and the six task blocks.
+    """The backbone and a task block for each affordance.
 
     `features` passes images (N, 3, H, W) through the backbone, `forward` passes features through the task blocks, so
     that no frame needs the backbone twice.
     """
 
-    def __init__(self, config: PerceptionConfig) -> None:
+    def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
         self.backbone = Backbone(config.width, config.batch_norm)
-        n_features = self.backbone.n_features(config.image_height, config.image_width)
+        n_features = self.backbone.n_features(*config.image_size)
         self.blocks = nn.ModuleDict({s.name: TaskBlock(getattr(config, s.name), s, n_features) for s in SPECS})
 
     @property
     def span(self) -> int:
         """Frames of history that the longest task block looks at, the present one included."""
-        return max(int(getattr(self.config, spec.name).span) for spec in SPECS)
+        return max(block.config.span for block in self.task_blocks().values())
 
     def features(self, images: Tensor) -> Tensor:
         """Normalised images (N, 3, H, W) to features (N, F)."""

@@ -1,57 +1,123 @@
-"""Settings of the network and of its training, and their presets."""
+"""Settings of a training, with their limits and presets. No import here waits for torch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from tyro.conf import arg
+
+from caldrive.checks import MOST_SEED, require_within
+from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
+
+
+@dataclass(frozen=True)
+class LossWeights:
+    """What each part counts in the sum that is the multi-task loss."""
+
+    hazard_stop: float = 1.0
+    """Weight of the hazard stop's loss."""
+    red_light: float = 1.0
+    """Weight of the red light's loss."""
+    speed_sign: float = 1.0
+    """Weight of the speed sign's loss."""
+    vehicle_distance: float = 1.0
+    """Weight of the loss of the distance to the vehicle ahead."""
+    relative_angle: float = 1.0
+    """Weight of the relative angle's loss."""
+    center_distance: float = 1.0
+    """Weight of the loss of the distance to the centre line."""
+    segmentation: float = 0.5
+    """Weight of the auxiliary segmentation's loss, where the recording has semantic images; 0 leaves it out."""
+
+
+# What each number may be, from and to; a setting that is not here may be any number.
+LIMITS: dict[str, tuple[float, float]] = {
+    "steps": (1, 10_000_000),
+    "batch": (1, 100_000),
+    "window": (1, 1000),
+    "learning_rate": (1e-9, 1.0),
+    "warm_up": (0, 10_000_000),
+    "final_rate": (0.0, 1.0),
+    "clip": (1e-9, 1e9),
+    "balance": (0.0, 1.0),
+    "alternative_share": (0.0, 1.0),
+    "history_steps": (0, 10_000_000),
+    "history_batch": (1, 100_000),
+    "backbone_chunk": (0, 1_000_000),
+    "validation_share": (0.0, 1.0),
+    "evaluate_every": (1, 10_000_000),
+    "save_every": (1, 10_000_000),
+    "seed": (0, MOST_SEED),
+}
 
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """How the network learns: Adam with a warm-up and a cosine down to final_rate times the base rate.
-
-    batch: windows a step; window: consecutive frames of each that give a loss; clip: largest norm of the gradient.
-    augment: colours, light, blur and noise; repaint: where the recording has semantic images, also the colours of what
-    stands there. others: share of the windows that are seen under another command, where one could be given.
-    angle_weight, segmentation: what the relative angle's loss and the second lesson's (where the recording has semantic
-    images; 0 leaves it out) count while the backbone learns; the other affordances' count 1.
-    block_steps: after the others, steps in which the task blocks that look back learn alone, from block_batch windows
-    with their history, whose frames the finished backbone saw once; until then a window is seen as if its stream began
-    there. 0: the blocks see their history from the first step on.
-    balance: 0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them.
-    at_once: frames that pass the backbone together, where a batch would find no room in memory, None for all; without
-    batch norm only, which looks at a whole batch. cache_gb: decoded images are kept in memory up to this size.
-    precision: auto, fp32 or bf16. device: cpu, cuda, or auto for a GPU where there is one. initial: file of the network
-    to begin with, None for a new one.
-    """
+    """How the network learns: Adam with a warm-up and a cosine, then a second stage for the temporal blocks alone."""
 
     steps: int = 11_000
+    """Steps of the whole network; those of its temporal blocks alone follow."""
     batch: int = 64
+    """Windows a step."""
     window: int = 1
-    learning_rate: float = 1e-3
+    """Consecutive frames of a window that give a loss."""
+    learning_rate: Annotated[float, arg(aliases=("--rate",))] = 1e-3
+    """Base learning rate."""
     warm_up: int = 100
+    """Steps in which the rate rises to the base rate."""
     final_rate: float = 0.02
+    """Share of the base rate that is left at the end of the cosine."""
     clip: float = 5.0
+    """Largest norm of the gradient."""
+    loss_weights: LossWeights = LossWeights(relative_angle=5.0)
+    """What the parts of the loss count while the backbone learns."""
     balance: float = 0.5
-    augment: bool = True
-    repaint: bool = True
-    others: float = 0.5
-    angle_weight: float = 1.0
-    segmentation: float = 0.5
-    block_steps: int = 3_000
-    block_batch: int = 256
-    at_once: int | None = None
+    """0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them."""
+    alternative_share: float = 0.5
+    """Share of the windows that are seen under another command, with its labels, where one could be given."""
+    augmentation: AugmentationConfig = AugmentationConfig()
+    """Other colours, light, blur and noise for whole images."""
+    recolour: RecolourConfig = RecolourConfig()
+    """Other colours for each class of things, where the recording has semantic images."""
+    history_steps: int = 3_000
+    """Steps of the second stage, in which the temporal blocks learn alone from what the finished backbone makes of the
+    frames. Until then a window is seen as if its stream began there. 0: they see their history from the first step."""
+    history_batch: int = 256
+    """Windows with their history in a step of the second stage."""
+    backbone_chunk: int = 0
+    """Images that pass the backbone together, with gradient checkpointing, where a batch finds no room in memory; 0 for
+    all of them. Only without batch norm, which looks at a whole batch."""
     validation_share: float = 0.05
+    """Share of the episodes that is kept for validation."""
     evaluate_every: int = 2000
+    """Steps from one validation to the next."""
     save_every: int = 100
+    """Steps after which the state is saved, from which a stopped training goes on."""
     cache_gb: float = 4.0
-    precision: str = "auto"
+    """Decoded images are kept in memory where they take at most so many GB."""
+    precision: Literal["auto", "fp32", "bf16"] = "auto"
+    """Precision of the arithmetic; auto takes bf16 where that is faster."""
     device: str = "auto"
+    """cpu, cuda, or auto for a GPU where there is one; torchrun trains on several."""
     initial: str | None = None
+    """A trained network (.safetensors) to begin with, instead of a new one; its blocks where they are built alike."""
+    imagenet: str = "none"
+    """VGG16's ImageNet weights for a backbone of full width to begin with: a file (.safetensors or .pth), cache for
+    those in torch.hub's cache, or none."""
     seed: int = 0
+    """Decides everything random."""
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in LIMITS.items():
+            usual = getattr(TrainingConfig, name)
+            require_within(f"--{name.replace('_', '-')}", getattr(self, name), low, high, usual)
+        if self.initial and self.imagenet not in ("none", "cache"):
+            raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
 
 
 TRAININGS = {
-    "small": TrainingConfig(angle_weight=5.0),
+    "small": TrainingConfig(),
     # Section 3.1: Adam, mini-batches of 32 sequences, base rate 5e-5.
     "paper": TrainingConfig(
         steps=75_000,
@@ -59,11 +125,12 @@ TRAININGS = {
         learning_rate=5e-5,
         warm_up=0,
         final_rate=1.0,
+        loss_weights=LossWeights(segmentation=0.0),
         balance=0.0,
-        block_steps=0,
-        repaint=False,
-        others=0.0,
-        segmentation=0.0,
-        at_once=64,
+        alternative_share=0.0,
+        recolour=RecolourConfig(enabled=False),
+        history_steps=0,
+        backbone_chunk=64,
+        imagenet="cache",
     ),
 }

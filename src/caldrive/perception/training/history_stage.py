@@ -1,5 +1,4 @@
-"""The last part of a training: task blocks that look back learn alone, from what the finished backbone makes of the
-frames.
+"""The second stage of a training: the temporal blocks learn alone, from the finished backbone's features.
 
 A frame with its history costs the backbone as many passes as the history has frames. A finished backbone passes each
 frame of the recording once, in the precision in which it drives; after that a step of the blocks, with history, takes
@@ -11,7 +10,6 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +21,7 @@ from torch.optim import Adam
 
 from caldrive.perception.dataset.frames import Frames, Ids
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.inference.engines import Features, driving_precision, features_in
+from caldrive.perception.inference.engines import BackboneEngine, backbone_engine, driving_precision
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.checkpoint import (
     CheckpointError,
@@ -32,29 +30,50 @@ from caldrive.perception.network.checkpoint import (
     round_to_half,
     write_tensors,
 )
-from caldrive.perception.targets import loss
-from caldrive.perception.training.run import TrainingRun, descend, learning_rate
+from caldrive.perception.targets import multitask_loss
+from caldrive.perception.training.run import SEED_STRIDE, TrainingRun, gradient_step, learning_rate
 from caldrive.progress import Progress
 
-FOLDER, CHUNK, BATCH = "features", 8192, 64  # frames in a file, and at once
+FRAMES_A_FILE, FRAMES_A_PASS = 8192, 64
+
+
+def feature_table(run: TrainingRun, info: CheckpointInfo, folder: Path, progress: Progress) -> Tensor:
+    """The features of every frame (N, F) by the backbone, rounded as it is stored; kept in `folder`, so that it goes on
+    after a kill. info: of the network as it is stored."""
+    network, frames = run.network.cpu().eval(), run.sampler.frames
+    round_to_half(network)
+    precision = driving_precision("auto", info)
+    digest = _digest(network.backbone, precision, info.ranges, frames)
+    engine = backbone_engine(precision, copy.deepcopy(network), info)
+    table = torch.empty(len(frames), network.backbone.n_features(*network.config.image_size)).half()
+    for number, first in enumerate(range(0, len(frames), FRAMES_A_FILE)):
+        path = folder / f"{number:04d}.safetensors"
+        ids = np.arange(first, min(first + FRAMES_A_FILE, len(frames)))
+        features = _saved_features(path, digest)
+        if features is None:
+            features = _features(frames, ids, engine)
+            write_tensors(path, {"features": features}, {"kind": "features", "digest": digest})
+        table[ids[0] : ids[-1] + 1] = features
+        progress("features", (int(ids[-1]) + 1) / len(frames))
+    return table
 
 
 def _digest(backbone: Backbone, precision: str, ranges: tuple[float, ...], frames: Frames) -> str:
     """Of all that the features depend on: the backbone, how it computes, and which frames it sees."""
-    found = hashlib.sha256(repr((precision, ranges, frames.digest)).encode())
+    digest = hashlib.sha256(repr((precision, ranges, frames.digest)).encode())
     for value in backbone.state_dict().values():
-        found.update(value.detach().cpu().numpy().tobytes())
-    return found.hexdigest()[:16]
+        digest.update(value.detach().cpu().numpy().tobytes())
+    return digest.hexdigest()[:16]
 
 
 @torch.inference_mode()
-def _see(frames: Frames, ids: Ids, features: Features) -> Tensor:
+def _features(frames: Frames, ids: Ids, engine: BackboneEngine) -> Tensor:
     """Features (N, F) of frames by number, in 16 bits."""
-    parts = (ids[k : k + BATCH] for k in range(0, len(ids), BATCH))
-    return torch.cat([features(normalise(to_float(frames.images(part)))).half() for part in parts])
+    parts = (ids[k : k + FRAMES_A_PASS] for k in range(0, len(ids), FRAMES_A_PASS))
+    return torch.cat([engine(normalise(to_float(frames.images(part)))).half() for part in parts])
 
 
-def _kept(path: Path, digest: str) -> Tensor | None:
+def _saved_features(path: Path, digest: str) -> Tensor | None:
     """The features in a file, where they are the wanted ones."""
     try:
         tensors, header = read_tensors(path)
@@ -63,52 +82,27 @@ def _kept(path: Path, digest: str) -> Tensor | None:
     return tensors["features"] if header.get("digest") == digest else None
 
 
-def feature_table(run: TrainingRun, info: CheckpointInfo, out: Path, progress: Progress) -> Tensor:
-    """What the backbone, rounded as it is stored, makes of every frame (N, F); kept in `out`, so that it goes on after
-    a kill. info: of the network as it is stored."""
-    network, frames = run.network.cpu().eval(), run.sampler.frames
-    round_to_half(network)
-    precision = driving_precision("auto", info)
-    digest = _digest(network.backbone, precision, info.ranges, frames)
-    features = features_in(precision, copy.deepcopy(network), info)
-    config = network.config
-    table = torch.empty(len(frames), network.backbone.n_features(config.image_height, config.image_width)).half()
-    for number, first in enumerate(range(0, len(frames), CHUNK)):
-        path, ids = out / FOLDER / f"{number:04d}.safetensors", np.arange(first, min(first + CHUNK, len(frames)))
-        part = _kept(path, digest)
-        if part is None:
-            part = _see(frames, ids, features)
-            write_tensors(path, {"features": part}, {"kind": "features", "digest": digest})
-        table[ids[0] : ids[-1] + 1] = part
-        progress("features", (int(ids[-1]) + 1) / len(frames))
-    return table
-
-
-def forget_features(out: Path) -> None:
-    """Frees the disk of what `feature_table` kept."""
-    shutil.rmtree(out / FOLDER, ignore_errors=True)
-
-
-def learn_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
-    """Trains the run's network's blocks that look back on features (N, F) of all its frames; yields each step's
-    loss."""
-    config = replace(run.config, steps=run.config.block_steps)  # the rate's warm-up and cosine begin anew
-    weights = {name: weight.cpu() for name, weight in run.weights.items()}
-    blocks = nn.ModuleDict({name: b for name, b in run.network.task_blocks().items() if b.config.length > 1})
+def train_temporal_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
+    """Trains the run's temporal blocks on features (N, F) of all its frames; yields each step's loss."""
+    config = replace(run.config, steps=run.config.history_steps)  # the rate begins again with its warm-up
+    weights = {name: weight.cpu() for name, weight in run.class_weights.items()}
+    blocks = nn.ModuleDict({name: block for name, block in run.network.task_blocks().items() if block.config.temporal})
     optimizer = Adam(blocks.parameters(), config.learning_rate)
     blocks.train()
-    for step in range(config.block_steps):
-        number = run.config.steps + step  # of the whole training
-        torch.manual_seed(config.seed * 1_000_003 + number)  # dropout
-        seen, command, targets = _lesson(run, features, number)
-        total = loss({name: block(seen, command) for name, block in blocks.items()}, targets, weights)
-        descend(optimizer, total, learning_rate(step, config), config.clip)
-        yield float(total.detach())
+    for step in range(config.history_steps):
+        run_step = run.config.steps + step  # counted through both stages
+        torch.manual_seed(config.seed * SEED_STRIDE + run_step)  # dropout
+        history, command, targets = _history_batch(run, features, run_step)
+        outputs = {name: block(history, command) for name, block in blocks.items()}
+        loss = multitask_loss(outputs, targets, weights)
+        gradient_step(optimizer, loss, learning_rate(step, config), config.clip)
+        yield float(loss.detach())
 
 
-def _lesson(run: TrainingRun, features: Tensor, number: int) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
-    """The features (B, T, F), commands (B, S) and targets (B * S,) of a step of the whole training."""
-    sampler, window, batch = run.sampler, run.config.window, run.config.block_batch
-    ids = sampler.frames.windows(sampler.draw(number, batch), window, run.network.span - 1)
-    command, targets = sampler.frames.lessons(ids[:, -window:], sampler.others(number, batch, run.config.others))
+def _history_batch(run: TrainingRun, features: Tensor, run_step: int) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
+    """The features (B, T, F), commands (B, S) and targets (B * S,) of a step."""
+    sampler, window, batch = run.sampler, run.config.window, run.config.history_batch
+    ids = sampler.frames.windows(sampler.draw(run_step, batch), window, run.network.span - 1)
+    alternatives = sampler.alternatives(run_step, batch, run.config.alternative_share)
+    command, targets = sampler.frames.commands_and_targets(ids[:, -window:], alternatives)
     return features[torch.from_numpy(ids)].float(), command, targets

@@ -13,39 +13,31 @@ from caldrive.perception.network.checkpoint import CheckpointError, read_tensors
 from caldrive.perception.training.run import TrainingRun
 
 KIND = "training"
-ADAM = {"step", "exp_avg", "exp_avg_sq"}  # what it knows of a parameter
-FREE = ("initial", "evaluate_every", "save_every", "cache_gb", "device")  # may change while a training is under way
+MODEL, OPTIMIZER = "model.", "optimizer."  # what the tensors' names begin with
+ADAM = {"step", "exp_avg", "exp_avg_sq"}  # what it keeps of a parameter
+# Settings that may change while a training is under way: its weights no longer depend on them.
+FREE = ("initial", "imagenet", "evaluate_every", "save_every", "cache_gb", "device")
 
 
 class Header(TypedDict):
-    """What a training's state says of itself. training, config: settings of the training and of the network; episodes:
-    digest of the recording; processes: of the team."""
+    """What a training's state says of itself. training, network: its settings; episodes: digest of the recording;
+    processes: how many share the work."""
 
     step: int
-    config: dict[str, Any]
+    network: dict[str, Any]
     training: dict[str, Any]
     episodes: str
     processes: int
 
 
-def _decisive(settings: dict[str, Any]) -> dict[str, Any]:
-    """Those of a training's settings on which its weights depend once it has begun."""
-    return {name: value for name, value in settings.items() if name not in FREE}
-
-
-def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Those whose names begin with a prefix, without it."""
-    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
-
-
 def save_state(path: Path, run: TrainingRun) -> None:
     """Write a run as it is between two steps."""
-    tensors = {f"lessons.{name}": value for name, value in run.lessons.state_dict().items()}
-    for number, state in run.optimizer.state_dict()["state"].items():
-        tensors |= {f"optimizer.{number}.{name}": value for name, value in state.items()}
+    tensors = {f"{MODEL}{name}": value for name, value in run.model.state_dict().items()}
+    for number, moments in run.optimizer.state_dict()["state"].items():
+        tensors |= {f"{OPTIMIZER}{number}.{name}": value for name, value in moments.items()}
     header: Header = {
-        "step": run.step, "config": asdict(run.network.config), "training": asdict(run.config),
-        "episodes": run.sampler.frames.digest, "processes": run.team.size,
+        "step": run.step, "network": asdict(run.network.config), "training": asdict(run.config),
+        "episodes": run.sampler.frames.digest, "processes": run.group.size,
     }  # fmt: skip
     write_tensors(path, tensors, {"kind": KIND} | header)
 
@@ -53,48 +45,71 @@ def save_state(path: Path, run: TrainingRun) -> None:
 def restore_state(path: Path, run: TrainingRun) -> None:
     """Take up in a new run what `save_state` left. Raises CheckpointError where the file is damaged, or belongs to
     another run."""
-    tensors, header = read_tensors(path)
-    if header.get("kind") != KIND:
-        raise CheckpointError(f"{path} is no training's state, but a {header.get('kind')}: give another --out")
+    tensors, values = read_tensors(path)
+    if values.get("kind") != KIND:
+        raise CheckpointError(f"found in {path} a {values.get('kind')}, wanted a training's state: give another --out")
     try:
-        known = as_type(header, Header)
-        if wrong := _of_another(run, tensors, known):
-            raise CheckpointError(f"{path} belongs to a run {wrong}")
-        if not 0 <= known["step"] <= run.config.steps:
-            raise ValueError(f"step {known['step']} of {run.config.steps}")
-        _take(run, tensors, known)
+        header = as_type(values, Header)
+        if difference := _difference(run, tensors, header):
+            raise CheckpointError(f"found in {path} a run {difference}")
+        if not 0 <= header["step"] <= run.config.steps:
+            raise ValueError(f"step {header['step']} of {run.config.steps}")
+        _restore(run, tensors, header)
     except CheckpointError:
         raise
     except (KeyError, ValueError, TypeError, RuntimeError) as error:
-        raise CheckpointError(f"{path} is damaged ({error}): remove it and train anew") from error
+        raise CheckpointError(
+            f"found that {path} is damaged ({error}), wanted a training's state: remove it, and train again"
+        ) from error
 
 
-def _of_another(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> str:
-    """What tells the run of a state from this one, and what to type; nothing where they are one."""
-    found = _decisive(header["training"]) | header["config"]
-    for name, wanted in (_decisive(asdict(run.config)) | asdict(run.network.config)).items():
-        if found.get(name) != wanted:
-            return f"with {name} {found.get(name)}, wanted {wanted}: give another --out"
-    if _under("lessons.", tensors).keys() != run.lessons.state_dict().keys():
-        recording = "with other lessons, as on a recording with or without semantic images"
-        return f"{recording}: give the same --data or another --out"
+def _difference(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> str:
+    """How the run of a state differs from this one, and what to type; nothing where it does not."""
+    saved = _decisive(header["training"], header["network"])
+    for name, wanted in _decisive(asdict(run.config), asdict(run.network.config)).items():
+        if saved.get(name) != wanted:
+            return f"with {name} {saved.get(name)}, wanted {wanted}: type the same settings, or another --out"
+    if _without_prefix(MODEL, tensors).keys() != run.model.state_dict().keys():
+        return (
+            "with other tasks, wanted the same, with or without semantic images: type the --data that it began with, "
+            "or another --out"
+        )
     if header["episodes"] != run.sampler.frames.digest:
-        return "on other episodes: give the --data that it began with, or another --out"
-    if header["processes"] != run.team.size:
-        return f"of {header['processes']} processes, found {run.team.size}: start as many"
+        return "on other episodes, wanted the same: type the --data that it began with, or another --out"
+    if header["processes"] != run.group.size:
+        return f"of {header['processes']} processes, wanted {run.group.size}: start as many"
     return ""
 
 
-def _take(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> None:
-    run.lessons.load_state_dict(_under("lessons.", tensors))
-    run.config = replace(run.config, initial=header["training"]["initial"])
-    states: dict[int, dict[str, Tensor]] = {}
-    for path, value in _under("optimizer.", tensors).items():
+def _decisive(training: dict[str, Any], network: dict[str, Any]) -> dict[str, Any]:
+    """The settings on which a run's weights depend once it has begun, nested ones by names as on the command line."""
+    return _flat({name: value for name, value in training.items() if name not in FREE} | {"network": network})
+
+
+def _flat(settings: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested settings side by side: {"a": {"b": 1}} as {"a.b": 1}."""
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {prefix + name: value}
+    return flat
+
+
+def _without_prefix(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Those whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
+
+
+def _restore(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> None:
+    run.model.load_state_dict(_without_prefix(MODEL, tensors))
+    saved = header["training"]
+    run.config = replace(run.config, initial=saved["initial"], imagenet=saved["imagenet"])
+    moments: dict[int, dict[str, Tensor]] = {}  # of each parameter
+    for path, value in _without_prefix(OPTIMIZER, tensors).items():
         number, name = path.split(".")
-        states.setdefault(int(number), {})[name] = value
-    whole = all(state.keys() == ADAM for state in states.values())
-    if not whole or (header["step"] and not states):
+        moments.setdefault(int(number), {})[name] = value
+    whole = all(values.keys() == ADAM for values in moments.values())
+    if not whole or (header["step"] and not moments):
         raise ValueError("without all of the optimizer's tensors")
     groups = run.optimizer.state_dict()["param_groups"]
-    run.optimizer.load_state_dict({"state": states, "param_groups": groups})
+    run.optimizer.load_state_dict({"state": moments, "param_groups": groups})
     run.step = header["step"]

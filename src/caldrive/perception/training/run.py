@@ -4,29 +4,34 @@ to the same weights."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 
 import torch
-from torch import Tensor, nn
+from torch import Generator, Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 from torch.optim import Adam
 
-from caldrive.affordances import SPECS
 from caldrive.perception.dataset.augmentation import augment
 from caldrive.perception.dataset.frames import Batch, Frames
-from caldrive.perception.dataset.recolour import repaint
+from caldrive.perception.dataset.recolour import recolour
 from caldrive.perception.dataset.sampler import Sampler
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import autocast
-from caldrive.perception.network.calibration import uncalibrated
-from caldrive.perception.network.checkpoint import CheckpointError, load_network
-from caldrive.perception.network.config import PerceptionConfig
+from caldrive.perception.network.config import NetworkConfig
 from caldrive.perception.network.network import Network
-from caldrive.perception.targets import ClassWeights, class_weights, loss
+from caldrive.perception.targets import ClassWeights, class_weights, multitask_loss
 from caldrive.perception.training.config import TrainingConfig
-from caldrive.perception.training.distributed import Team
-from caldrive.perception.training.multitask import STAGE, Lessons, Segmentation, segmentation_loss
+from caldrive.perception.training.distributed import ProcessGroup
+from caldrive.perception.training.initial import initial_network
+from caldrive.perception.training.multitask import (
+    SEGMENTATION,
+    SEGMENTED_STAGE,
+    MultiTaskModel,
+    SegmentationHead,
+    segmentation_loss,
+)
+
+SEED_STRIDE = 1_000_003  # more than the steps of a run, so that the steps of two runs have different seeds
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -38,11 +43,11 @@ def learning_rate(step: int, config: TrainingConfig) -> float:
     return config.learning_rate * share
 
 
-def descend(optimizer: Adam, total: Tensor, rate: float, clip: float) -> None:
-    """One step of Adam's down the gradient of a loss, no longer than clip; then the gradient is gone."""
+def gradient_step(optimizer: Adam, loss: Tensor, rate: float, clip: float) -> None:
+    """One step of Adam's down the gradient of a loss, whose norm is clipped; then the gradient is gone."""
     (group,) = optimizer.param_groups
     group["lr"] = rate
-    total.backward()  # type: ignore[no-untyped-call]
+    loss.backward()  # type: ignore[no-untyped-call]
     torch.nn.utils.clip_grad_norm_(group["params"], clip)
     optimizer.step()
     optimizer.zero_grad(set_to_none=True)
@@ -53,100 +58,80 @@ class TrainingRun:
     """A training run: what changes from step to step, and what is needed to change it."""
 
     config: TrainingConfig
-    lessons: Lessons
+    model: MultiTaskModel
     optimizer: Adam
     sampler: Sampler
-    weights: ClassWeights
-    team: Team
+    class_weights: ClassWeights
+    group: ProcessGroup
     step: int = 0
-    model: nn.Module = field(init=False)
+    _parallel: nn.Module = field(init=False)  # the model, or what averages its gradients over the processes
 
     def __post_init__(self) -> None:
-        self.model = self.lessons
-        if self.team.size > 1:  # a batch without some command leaves its group of nodes without a gradient
-            self.model = DistributedDataParallel(self.model, find_unused_parameters=True)
+        self._parallel = self.model
+        if self.group.size > 1:  # a batch without some command leaves its group of nodes without a gradient
+            self._parallel = DistributedDataParallel(self.model, find_unused_parameters=True)
 
     @property
     def network(self) -> Network:
-        return self.lessons.network
+        """The network that is trained."""
+        return self.model.network
 
     @property
     def context(self) -> int:
         """Frames of history that a window brings along."""
-        return 0 if self.config.block_steps else self.network.span - 1
+        return 0 if self.config.history_steps else self.network.span - 1
 
     def advance(self) -> float:
         """One step; returns its loss, where there are several processes that of this one's share of the batch."""
-        config, team = self.config, self.team
-        seed = (config.seed * 1_000_003 + self.step) * team.size + team.rank
-        generator = torch.Generator().manual_seed(seed)
+        seed = (self.config.seed * SEED_STRIDE + self.step) * self.group.size + self.group.rank
+        generator = Generator().manual_seed(seed)
         torch.manual_seed(seed)  # dropout
-        mine = slice(team.rank, None, team.size)
-        starts = self.sampler.draw(self.step, config.batch)[mine]
-        others = self.sampler.others(self.step, config.batch, config.others)[mine]
-        batch = self.sampler.frames.batch(starts, config.window, self.context, others)
-        images = normalise(self._augmented(batch, generator))
-        targets = {name: target.to(team.device) for name, target in batch.targets.items()}
-        self.model.train()
-        with autocast(config.precision, team.device):
-            outputs = self.model(*(x.to(team.device) for x in (images, batch.index, batch.command)))
-        total = loss(outputs, targets, self.weights, config.angle_weight)
-        if batch.semantics is not None and "segmentation" in outputs:
-            second = segmentation_loss(outputs["segmentation"], batch.semantics, generator)
-            total = total + config.segmentation * second
-        descend(self.optimizer, total, learning_rate(self.step, config), config.clip)
+        loss = self._loss(self._batch(), generator)
+        gradient_step(self.optimizer, loss, learning_rate(self.step, self.config), self.config.clip)
         self.step += 1
-        return float(total.detach())
+        return float(loss.detach())
 
-    def _augmented(self, batch: Batch, generator: torch.Generator) -> Tensor:
-        """A batch's images (N, 3, H, W), augmented where that is wanted, and painted anew where it is known how."""
-        images = to_float(batch.images)
-        if not self.config.augment:
-            return images
-        if self.config.repaint and batch.semantics is not None:
-            images = repaint(images, batch.semantics, batch.group, generator)
-        return augment(images, generator, batch.group)
+    def _batch(self) -> Batch:
+        """This process' share of the step's windows."""
+        config, share = self.config, slice(self.group.rank, None, self.group.size)
+        starts = self.sampler.draw(self.step, config.batch)[share]
+        alternatives = self.sampler.alternatives(self.step, config.batch, config.alternative_share)[share]
+        return self.sampler.frames.batch(starts, config.window, self.context, alternatives)
+
+    def _loss(self, batch: Batch, generator: Generator) -> Tensor:
+        """The multi-task loss of a batch, and the segmentation's."""
+        device, weights = self.group.device, vars(self.config.loss_weights)
+        images = normalise(self._augmented(batch, generator))
+        targets = {name: target.to(device) for name, target in batch.targets.items()}
+        self._parallel.train()
+        with autocast(self.config.precision, device):
+            outputs = self._parallel(*(tensor.to(device) for tensor in (images, batch.index, batch.command)))
+        loss = multitask_loss(outputs, targets, self.class_weights, weights)
+        if batch.semantics is not None and SEGMENTATION in outputs:
+            auxiliary = segmentation_loss(outputs[SEGMENTATION], batch.semantics, generator)
+            loss = loss + weights[SEGMENTATION] * auxiliary
+        return loss
+
+    def _augmented(self, batch: Batch, generator: Generator) -> Tensor:
+        """A batch's images (N, 3, H, W), recoloured where the recording has semantic images, and augmented."""
+        images, config = to_float(batch.images), self.config
+        if config.recolour.enabled and batch.semantics is not None:
+            images = recolour(images, batch.semantics, batch.group, generator, config.recolour)
+        if config.augmentation.enabled:
+            images = augment(images, generator, batch.group, config.augmentation)
+        return images
 
 
-def anew(found: PerceptionConfig, wanted: PerceptionConfig) -> list[str]:
-    """Names of the task blocks that cannot be taken from a network, as they are built otherwise than wanted."""
-    pairs = ((spec.name, getattr(found, spec.name), getattr(wanted, spec.name)) for spec in SPECS)
-    return [name for name, old, new in pairs if replace(old, dropout=new.dropout) != new]
-
-
-def _initial(path: str, perception: PerceptionConfig) -> Network:
-    """A network that begins with a trained one's backbone, and with those of its blocks that are built as wanted.
-
-    Raises CheckpointError where the backbone is not.
-    """
-    found, info = load_network(path)
-    wanted = {spec.name: getattr(perception, spec.name) for spec in SPECS}
-    if replace(info.config, **wanted) != perception:
-        raise CheckpointError(f"{path} is a network of another width or image size than wanted: give its --preset")
-    network, found = Network(perception), uncalibrated(found, info.data.get("train_classes", {}))
-    network.backbone.load_state_dict(found.backbone.state_dict())
-    for name in wanted.keys() - set(anew(info.config, perception)):
-        network.blocks[name].load_state_dict(found.blocks[name].state_dict())
-    return network
-
-
-def start(
-    config: TrainingConfig,
-    perception: PerceptionConfig,
-    frames: Frames,
-    imagenet: Path | None,
-    team: Team,
-    initial: str | None = None,
+def start_run(
+    config: TrainingConfig, network_config: NetworkConfig, frames: Frames, group: ProcessGroup
 ) -> TrainingRun:
-    """A run at its first step; initial: the network to begin with."""
+    """A run at its first step, on these frames."""
     torch.manual_seed(config.seed)
-    network = Network(perception) if initial is None else _initial(initial, perception)
-    if imagenet is not None:
-        network.backbone.load_imagenet(imagenet)
+    network = initial_network(config, network_config)
     head = None
-    if config.segmentation and frames.has_semantics:
-        head = Segmentation(network.backbone.channels[STAGE])
-    lessons = Lessons(network, head, config.at_once).to(team.device)
+    if config.loss_weights.segmentation and frames.has_semantics:
+        head = SegmentationHead(network.backbone.channels[SEGMENTED_STAGE])
+    model = MultiTaskModel(network, head, config.backbone_chunk).to(group.device)
     sampler = Sampler(frames, config.window, config.balance, config.seed)
-    weights = {name: weight.to(team.device) for name, weight in class_weights(sampler.class_counts()).items()}
-    return TrainingRun(config, lessons, Adam(lessons.parameters(), config.learning_rate), sampler, weights, team)
+    weights = {name: weight.to(group.device) for name, weight in class_weights(sampler.class_counts()).items()}
+    return TrainingRun(config, model, Adam(model.parameters(), config.learning_rate), sampler, weights, group)
