@@ -87,7 +87,11 @@ def test_the_python_of_the_first_pages_runs(page: Path, desk: Path, capsys: pyte
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_command_on_a_page_is_understood(page: Path) -> None:
+def test_every_command_on_a_page_is_understood(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for block in blocks(page):
+        if block.title:
+            (tmp_path / block.title).write_text(block.text)
     for arguments in caldrive_lines(page):
         parse(arguments)
 
