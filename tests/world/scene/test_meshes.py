@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.world.rendering.actors import car_actors, person_actors
@@ -18,7 +16,7 @@ from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.cars import LENGTH, SHAPES, WIDTH, car_mesh, far_car_mesh
 from caldrive.world.scene.decor import TOWNS
 from caldrive.world.scene.ground import KERB_HEIGHT, kerb_mesh, road_mesh
-from caldrive.world.scene.meshes import Mesh, box, disc, lathe, merge, turned
+from caldrive.world.scene.meshes import Mesh, box, disc, lathe, merge
 from caldrive.world.scene.people import HEIGHT, far_person_mesh, person_mesh
 from caldrive.world.scene.streets import Border, chains
 
@@ -51,16 +49,6 @@ def test_normals_agree_with_the_order_of_corners() -> None:
 def test_a_disc_looks_where_it_is_told_to(facing: int, axis: str, side: tuple[int, int]) -> None:
     total = area_vectors(disc((0, 0, 1), 1.0, 32, (0, 0, 0), facing, axis=axis)).sum(axis=0)
     assert total[:2] == pytest.approx(math.pi * np.array(side), rel=0.02, abs=1e-6)
-
-
-@given(st.floats(-50, 50), st.floats(-50, 50), st.floats(-3.1, 3.1))
-def test_turning_a_mesh_keeps_its_shape(x: float, y: float, heading: float) -> None:
-    made = box((0, 0, 0.5), (2, 4, 1), (255, 0, 0))
-    moved = turned(made, Pose(x, y, heading))
-    assert np.linalg.norm(area_vectors(moved), axis=1) == pytest.approx(
-        np.linalg.norm(area_vectors(made), axis=1), rel=1e-3
-    )
-    assert moved.vertices["position"][:, :2].mean(axis=0) == pytest.approx((x, y), abs=1e-3)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

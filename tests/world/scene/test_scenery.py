@@ -12,7 +12,7 @@ from caldrive.world.rendering.visibility import CELL, Sight
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.scenery import CLEAR_OF_POSTS, Prop, build_scenery
-from caldrive.world.scene.shadows import RESOLUTION, TALLEST, cast, shadow_heights
+from caldrive.world.scene.shadows import RESOLUTION, TALLEST_SHADOW, cast, shadow_heights
 
 
 @pytest.fixture(scope="module", params=("town01", "town02"))
@@ -65,13 +65,13 @@ def test_no_tree_hides_a_post(town: tuple[RoadNetwork, tuple[Prop, ...]]) -> Non
 
 def test_a_wall_throws_its_shadow_away_from_the_sun() -> None:
     heights = np.zeros((200, 200), np.uint8)
-    heights[100, :] = round(4.0 / TALLEST * 255)
+    heights[100, :] = round(4.0 / TALLEST_SHADOW * 255)
     shade = cast(heights, np.array([0.0, np.sqrt(0.5), np.sqrt(0.5)]))  # the sun stands at 45 degrees over +y
     reach = round(4.0 / RESOLUTION)
     assert (shade[100 - reach + 2 : 100, 50] > 0).all()
     assert not shade[: 100 - reach - 1, 50].any()
     assert not shade[101:, 50].any()
-    assert shade[100 - reach // 2, 50] * TALLEST / 255 == pytest.approx(2.0, abs=0.3)
+    assert shade[100 - reach // 2, 50] * TALLEST_SHADOW / 255 == pytest.approx(2.0, abs=0.3)
 
 
 def test_a_house_shades_what_lies_behind_it() -> None:

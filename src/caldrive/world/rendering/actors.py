@@ -23,11 +23,11 @@ Instances = NDArray[np.void]
 STRIDE = 0.75  # m of one step
 SWING = 0.30  # rad at 1 m/s
 STANDS = 0.3  # m/s below which the brake lamps are lit
-_PAINTS, _UPPERS, _LOWERS, _SKINS, _HAIRS = (
-    np.array(colors, np.uint8) for colors in (cars.PAINTS, people.UPPERS, people.LOWERS, people.SKINS, people.HAIRS)
+_PAINTS, _UPPERS, _TROUSERS, _SKINS, _HAIRS = (
+    np.array(colors, np.uint8) for colors in (cars.PAINTS, people.UPPERS, people.TROUSERS, people.SKINS, people.HAIRS)
 )
 
-_ROOFS = np.array(cars.HEIGHTS)
+_ROOFS = np.array([shape.height for shape in cars.SHAPES])
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ def _car_looks(ids: tuple[str, ...]) -> tuple[NDArray[np.int64], Instances]:
 def _person_looks(ids: tuple[str, ...]) -> tuple[NDArray[np.float64], Instances]:
     """Heights over that of the mesh, and instances with the colours filled in."""
     seeds, made = _seeds(ids), np.zeros(len(ids), INSTANCE)
-    for k, palette in enumerate((_UPPERS, _LOWERS, _SKINS, _HAIRS)):
+    for k, palette in enumerate((_UPPERS, _TROUSERS, _SKINS, _HAIRS)):
         made["colors"][:, k, :3] = palette[seeds // 7**k % len(palette)]
-    return people.height(seeds) / people.HEIGHT, made
+    return people.heights(seeds) / people.HEIGHT, made
 
 
 def car_actors(vehicles: Sequence[VehicleState]) -> Actors:

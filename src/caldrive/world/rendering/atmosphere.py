@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
-from caldrive.world.rendering.gl import programs, smooth_texture
+from caldrive.world.rendering.gl import smooth_texture
+from caldrive.world.rendering.programs import programs
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.scene.decor import Decor
 from caldrive.world.scene.scenery import Prop
@@ -43,8 +44,8 @@ class Atmosphere:
 
     def _bind(self, sky: Look, dome: moderngl.Texture, shadows: moderngl.Texture) -> None:
         made = programs()
-        made.look.write(self._block(sky))
-        made.look.bind_to_uniform_block(1)
+        made.lighting.write(self._block(sky))
+        made.lighting.bind_to_uniform_block(1)
         made.layers.use(0)
         for unit, texture in ((1, shadows), (2, dome), (3, made.drops)):
             texture.use(unit)

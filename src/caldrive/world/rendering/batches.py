@@ -10,7 +10,8 @@ import numpy as np
 
 from caldrive.datatypes import Semantic
 from caldrive.world.rendering.actors import INSTANCE, Instances
-from caldrive.world.rendering.gl import Programs, SemanticPrograms, gl_context, programs, semantic_programs
+from caldrive.world.rendering.gl import gl_context
+from caldrive.world.rendering.programs import Programs, SemanticPrograms, programs, semantic_programs
 from caldrive.world.rendering.visibility import Level, Tiles
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.scene.buildings import building_meshes

@@ -13,9 +13,10 @@ from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState,
 from caldrive.world.rendering.actors import Actors, car_actors, person_actors
 from caldrive.world.rendering.atmosphere import Atmosphere
 from caldrive.world.rendering.batches import Crowd, TownBatch, town_batches, vertex_array
-from caldrive.world.rendering.gl import Target, gl_context, programs, semantic_programs
+from caldrive.world.rendering.gl import RenderTarget, gl_context
 from caldrive.world.rendering.lens import Lens, View, mounted
 from caldrive.world.rendering.overlays import Overlays
+from caldrive.world.rendering.programs import programs, semantic_programs
 from caldrive.world.rendering.visibility import DETAIL, Cells, Place, Sight
 from caldrive.world.scene.cars import SHAPES, car_mesh, far_car_mesh
 from caldrive.world.scene.people import far_person_mesh, person_mesh
@@ -55,7 +56,7 @@ class CameraRig:
         self._dome = vertex_array(made.sky, data, index)
         self._atmosphere, self._overlays = Atmosphere(roads, scenery, decor), Overlays(roads.posts)
         self._sight = Sight(scenery)
-        self._targets: dict[tuple[tuple[int, int], int], Target] = {}
+        self._targets: dict[tuple[tuple[int, int], int], RenderTarget] = {}
 
     def render(self, shot: Shot, mounts: Sequence[CameraConfig]) -> list[Image]:
         """One picture (H, W, 3) for each mount on the ego. Raises ValueError for an unknown weather."""
@@ -87,20 +88,20 @@ class CameraRig:
         images = []
         for lens in (mounted(shot.ego, mount) for mount in mounts):
             target = self._open(lens, 1, 0.0)
-            target.drawn.clear()  # sky is where nothing is drawn
+            target.framebuffer.clear()  # sky is where nothing is drawn
             self._draw_solid(lens.view(), lens, cars, people, semantic=True)
             images.append(target.read()[..., 0])
         return images
 
-    def _open(self, lens: Lens, fine: int, time: float) -> Target:
+    def _open(self, lens: Lens, fine: int, time: float) -> RenderTarget:
         """An empty target that is drawn into from now on."""
         if (lens.size, fine) not in self._targets:
-            self._targets[lens.size, fine] = Target(lens.size, fine)
+            self._targets[lens.size, fine] = RenderTarget(lens.size, fine)
         target, gl, made = self._targets[lens.size, fine], gl_context(), programs()
-        target.drawn.use()
+        target.framebuffer.use()
         gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         gl.front_face, gl.depth_func = "cw", "<="  # pictures are drawn upside down
-        target.drawn.clear(0.5, 0.5, 0.5, 1.0)
+        target.framebuffer.clear(0.5, 0.5, 0.5, 1.0)
         eye = (lens.pose.x, lens.pose.y, lens.height, time % 64.0)
         block = np.concatenate((lens.matrix().T.ravel(), eye, (*lens.size, lens.focal, (time * 7.3) % 1.0)))
         made.frame.write(block.astype("f4").tobytes())

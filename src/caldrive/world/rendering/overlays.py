@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from caldrive.datatypes import LightState, Pose
 from caldrive.geometry import moved
-from caldrive.world.rendering.gl import gl_context, programs
+from caldrive.world.rendering.gl import gl_context
 from caldrive.world.rendering.lens import View
+from caldrive.world.rendering.programs import programs
 from caldrive.world.roads.network import LightPost
 from caldrive.world.scene.furniture import LAMP_FACE, LAMPS
 from caldrive.world.scene.ground import KERB_HEIGHT

@@ -27,7 +27,6 @@ Look = tuple[RGB, Tex]
 KERB_HEIGHT = 0.12
 KERB_WIDTH = 0.2
 SOLID_NEAR_JUNCTION = 18.0  # m
-SOLID = 4  # a centre line near a junction
 YARD_LEVEL = -0.05
 FAR_AWAY = 900.0  # m to a stop line where there is none
 LONGEST = 24.0  # m of one piece of ground, so that what lies out of sight is left out
@@ -69,7 +68,7 @@ def _strip(chain: Chain, dash: float) -> Mesh:
     made = np.stack((rows[:-1, 1], rows[1:, 1], rows[1:, 0], rows[:-1, 0]), axis=1)
     middle = (s[:-1] + s[1:]) / 2
     near = (middle < zone) | (middle > chain.line.length - zone)
-    left = np.where(near & (chain.left == Border.CENTER), SOLID, chain.left)
+    left = np.where(near & (chain.left == Border.CENTER), Border.SOLID_CENTER, chain.left)
     color = np.stack(np.broadcast_arrays(left, chain.right, round(chain.width * 25)), axis=-1)
     made["color"] = color[:, None]
     return _from_corners(made)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from caldrive.datatypes import Pose, Semantic
+from caldrive.datatypes import Semantic
 
 # uv: texture coordinates and layer. normal: 128 + 127 times x, y, z. slot: which part of a car or
 # person it is, or the class of what stands still (semantics.py). spare: see the shaders.
@@ -21,6 +21,7 @@ VERTEX = np.dtype(
 Vertices = NDArray[np.void]
 Triangles = NDArray[np.uint32]  # (N, 3), counter-clockwise seen from outside
 RGB = tuple[int, int, int]
+WHITE: RGB = (255, 255, 255)
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,11 @@ class Detail:
     always: Mesh = EMPTY
     near: Mesh = EMPTY
     far: Mesh = EMPTY
+
+
+def from_hex(*numbers: int) -> tuple[RGB, ...]:
+    """Colours from numbers such as 0xFF8000."""
+    return tuple(((number >> 16) & 255, (number >> 8) & 255, number & 255) for number in numbers)
 
 
 def packed(normal: ArrayLike) -> NDArray[np.float64]:
@@ -86,21 +92,6 @@ def quads(corners: ArrayLike, color: ArrayLike, uv: ArrayLike = (0, 0, 0), slot:
     first = 4 * np.arange(len(made), dtype=np.uint32)[:, None]
     corners_of = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
     return Mesh(made.reshape(-1), (first[:, None] + corners_of).reshape(-1, 3).astype(np.uint32))
-
-
-def wall(
-    points: ArrayLike, low: float, high: float, color: RGB, layer: int = 0, tile: float = 1.0, slot: int = 0
-) -> Mesh:
-    """A vertical wall over a line of points (N, 2), seen from its right side; uv in tiles of `tile` metres."""
-    p = np.asarray(points, dtype=float)
-    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1)))) / tile
-    bottom, top = (np.column_stack((p, np.full(len(p), z))) for z in (low, high))
-    corners = np.stack((bottom[:-1], bottom[1:], top[1:], top[:-1]), axis=1)
-    uv = np.zeros((len(p) - 1, 4, 3))
-    uv[..., 0] = np.stack((s[:-1], s[1:], s[1:], s[:-1]), axis=1)
-    uv[:, 2:, 1] = (high - low) / tile
-    uv[..., 2] = layer
-    return quads(corners, color, uv, slot)
 
 
 def box(
@@ -163,16 +154,6 @@ def smooth(mesh: Mesh, center: tuple[float, float, float], squash: float = 1.0) 
     made = mesh.vertices.copy()
     away = (made["position"] - np.asarray(center)) * (1, 1, squash)
     made["normal"] = packed(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9))
-    return Mesh(made, mesh.triangles)
-
-
-def turned(mesh: Mesh, pose: Pose, height: float = 0.0, scale: float = 1.0) -> Mesh:
-    """A mesh scaled and moved from its own frame to a pose in the world."""
-    c, s = math.cos(pose.heading), math.sin(pose.heading)
-    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    made = mesh.vertices.copy()
-    made["position"] = scale * made["position"] @ turn + np.array([pose.x, pose.y, height])
-    made["normal"] = packed((made["normal"] - 128.0) / 127 @ turn)
     return Mesh(made, mesh.triangles)
 
 

@@ -16,12 +16,12 @@ from caldrive.world.scene.scenery import Prop
 
 RESOLUTION = 0.25  # m of one pixel
 MARGIN = 30.0  # m around the roads
-TALLEST = 32.0  # m, the value of a full pixel
-Heights = NDArray[np.uint8]  # in units of TALLEST / 255
+TALLEST_SHADOW = 32.0  # m, the value of a full pixel
+Heights = NDArray[np.uint8]  # in units of TALLEST_SHADOW / 255
 
 
 def _units(height: float) -> int:
-    return round(min(height / TALLEST, 1.0) * 255)
+    return round(min(height / TALLEST_SHADOW, 1.0) * 255)
 
 
 def _drawn(props: Sequence[Prop], bounds: tuple[float, float, float, float], kind: str) -> Heights:
@@ -54,7 +54,7 @@ def _shifted(heights: Heights, columns: int, rows: int) -> Heights:
 def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
     """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the fall."""
     flat = float(np.hypot(sun[0], sun[1]))
-    fall, shade = float(sun[2]) / flat * 255 / TALLEST, heights.copy()
+    fall, shade = float(sun[2]) / flat * 255 / TALLEST_SHADOW, heights.copy()
     reach, step = float(heights.max()) / fall, RESOLUTION
     while step < reach:
         columns, rows = (round(step * float(s) / flat / RESOLUTION) for s in sun[:2])
@@ -80,7 +80,7 @@ def _softened(heights: Heights) -> Heights:
 def shadow_heights(
     props: Sequence[Prop], bounds: tuple[float, float, float, float], sun: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """Shadow heights (rows, columns, 2) in units of TALLEST / 255: of buildings with trees, of buildings alone."""
+    """Shadow heights (rows, columns, 2): of buildings with trees, and of buildings alone."""
     houses = cast(_drawn(props, bounds, "building"), sun)
     trees = cast(_drawn(props, bounds, "tree"), sun)
     return np.stack((_softened(np.maximum(houses, trees)), _softened(houses)), axis=-1)

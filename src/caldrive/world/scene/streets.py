@@ -18,9 +18,10 @@ class Border(IntEnum):
     """What is painted along one side of a lane."""
 
     NOTHING = 0
-    CENTER = 1  # broken, solid near junctions
+    CENTER = 1  # broken
     EDGE = 2
     DIVIDER = 3  # parts lanes of one direction
+    SOLID_CENTER = 4  # a centre line near a junction
 
 
 @dataclass(frozen=True)
