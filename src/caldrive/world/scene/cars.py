@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from enum import IntEnum
 from itertools import pairwise
 
-from caldrive.world.scene.meshes import RGB, WHITE, Mesh, box, disc, from_hex, merge, quads
+from caldrive.world.scene.meshes import RGB, WHITE, Mesh, Point, Surface, box, disc, from_hex, merge, quads
 
 LENGTH, WIDTH = 4.4, 1.8  # m, of the meshes
 SILL = 0.24  # m above the road
 GLOWING = 8  # in the spare byte of a vertex: lit by nothing but itself
-_GLASS: RGB = (38, 46, 56)
-_TYRE: RGB = (24, 24, 26)
-_RIM: RGB = (150, 152, 156)
 
 
 class CarPart(IntEnum):
@@ -46,6 +43,9 @@ class CarShape:
         return max(roof for _, _, roof in self.sections)
 
 
+_GLASS: RGB = (38, 46, 56)
+_PAINT = Surface(WHITE, slot=CarPart.PAINT)
+_TYRE, _RIM = Surface((24, 24, 26)), Surface((150, 152, 156))
 HATCHBACK = CarShape(
     sections=(
         (2.2, 0.58, 0.58), (2.08, 0.78, 0.78), (0.95, 0.94, 0.94), (0.25, 0.95, 1.42), (-1.45, 0.97, 1.44),
@@ -131,9 +131,7 @@ def _panels_between(
     )  # fmt: skip
 
 
-def _plate(
-    at: tuple[float, float, float], size: tuple[float, float], color: RGB, part: CarPart = CarPart.BODY, spare: int = 0
-) -> Mesh:
+def _plate(at: Point, size: tuple[float, float], color: RGB, part: CarPart = CarPart.BODY, spare: int = 0) -> Mesh:
     """A flat plate (width, height) on the car's front or, for x < 0, its back."""
     (x, y, z), (a, b), facing = at, (size[0] / 2, size[1] / 2), 1 if at[0] > 0 else -1
     corners = [(x, y - a, z - b), (x, y + a, z - b), (x, y + a, z + b), (x, y - a, z + b)]
@@ -171,8 +169,8 @@ def _wheels(shape: CarShape) -> list[Mesh]:
     parts, r = [], shape.wheel
     for x in shape.axles:
         for y in (1, -1):
-            parts.append(disc((x, y * (WIDTH / 2 + 0.012), r), r, 8, _TYRE, y, axis="y"))
-            parts.append(disc((x, y * (WIDTH / 2 + 0.02), r), r * 0.6, 6, _RIM, y, axis="y"))
+            parts.append(disc((x, y * (WIDTH / 2 + 0.012), r), r, 8, _TYRE, facing=y, axis="y"))
+            parts.append(disc((x, y * (WIDTH / 2 + 0.02), r), r * 0.6, 6, _RIM, facing=y, axis="y"))
             parts.append(box((x, y * (WIDTH / 2 - 0.11), r * 0.8), (2 * r * 0.86, 0.2, r * 1.6), _TYRE))
     return parts
 
@@ -187,5 +185,5 @@ def _pillars(shape: CarShape) -> list[Mesh]:
     for y in (1, -1):
         pillar = [(front, y * half, s0), (back, y * half, s0), (back, y * roof, r0), (front, y * roof, r0)]
         parts.append(quads([pillar[::y]], WHITE, slot=CarPart.PAINT))
-        parts.append(box((x0 + 0.4, y * 0.98, s0 + 0.1), (0.12, 0.2, 0.14), WHITE, slot=CarPart.PAINT))
+        parts.append(box((x0 + 0.4, y * 0.98, s0 + 0.1), (0.12, 0.2, 0.14), _PAINT))
     return parts

@@ -8,11 +8,10 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.world.scene.meshes import RGB, WHITE, Mesh, box, from_hex, lathe, merge, smooth
+from caldrive.world.scene.meshes import RGB, WHITE, Mesh, Surface, box, from_hex, lathe, merge, smooth
 
 HEIGHT = 1.75  # m, of the meshes
 HIP_HEIGHT, SHOULDER_HEIGHT = 0.88, 1.42  # m, what legs and arms turn about
-_SHOES: RGB = (44, 38, 36)
 
 
 class BodyPart(IntEnum):
@@ -33,6 +32,11 @@ class Limb(IntEnum):
     RIGHT_ARM = 4
 
 
+def _surface(part: BodyPart, limb: int = 0) -> Surface:
+    """White, which the instance's colours tint."""
+    return Surface(WHITE, slot=part, spare=limb)
+
+
 UPPERS: Sequence[RGB] = from_hex(
     0xC23B3B, 0x2F5AA8, 0xE8E4DA, 0x2E2E34, 0x3F8A5C, 0xE0B23C, 0x7A4A9A, 0xD9772E, 0x6FA7C7, 0xB85C88
 )
@@ -48,41 +52,41 @@ def heights(seeds: NDArray[np.int64]) -> NDArray[np.float64]:
 
 def person_mesh() -> Mesh:
     """A person seen from near, about 130 triangles."""
-    torso = box((0, 0, 1.16), (0.21, 0.36, 0.60), WHITE, slot=BodyPart.UPPER, top=1.12)
-    hips = box((0, 0, 0.86), (0.20, 0.34, 0.14), WHITE, slot=BodyPart.TROUSERS)
+    torso = box((0, 0, 1.16), (0.21, 0.36, 0.60), _surface(BodyPart.UPPER), top=1.12)
+    hips = box((0, 0, 0.86), (0.20, 0.34, 0.14), _surface(BodyPart.TROUSERS))
     return merge((*_legs(), torso, hips, *_arms(), *_head(6)))
 
 
 def far_person_mesh() -> Mesh:
     """A person seen from afar, about 50 triangles."""
     legs = [
-        box((0, y, 0.45), (0.2, 0.17, 0.9), WHITE, slot=BodyPart.TROUSERS, spare=limb)
+        box((0, y, 0.45), (0.2, 0.17, 0.9), _surface(BodyPart.TROUSERS, limb))
         for y, limb in ((0.1, Limb.LEFT_LEG), (-0.1, Limb.RIGHT_LEG))
     ]
-    torso = box((0, 0, 1.16), (0.23, 0.52, 0.62), WHITE, slot=BodyPart.UPPER)
-    head = box((0, 0, 1.56), (0.2, 0.19, 0.22), WHITE, slot=BodyPart.SKIN)
-    hair = box((-0.02, 0, 1.70), (0.22, 0.21, 0.12), WHITE, slot=BodyPart.HAIR)
+    torso = box((0, 0, 1.16), (0.23, 0.52, 0.62), _surface(BodyPart.UPPER))
+    head = box((0, 0, 1.56), (0.2, 0.19, 0.22), _surface(BodyPart.SKIN))
+    hair = box((-0.02, 0, 1.70), (0.22, 0.21, 0.12), _surface(BodyPart.HAIR))
     return merge((*legs, torso, head, hair))
 
 
 def _legs() -> list[Mesh]:
     parts = []
     for y, limb in ((0.1, Limb.LEFT_LEG), (-0.1, Limb.RIGHT_LEG)):
-        parts.append(box((0, y, 0.47), (0.17, 0.16, 0.84), WHITE, slot=BodyPart.TROUSERS, spare=limb, top=1.15))
-        parts.append(box((0.05, y, 0.045), (0.27, 0.11, 0.09), _SHOES, spare=limb))
+        parts.append(box((0, y, 0.47), (0.17, 0.16, 0.84), _surface(BodyPart.TROUSERS, limb), top=1.15))
+        parts.append(box((0.05, y, 0.045), (0.27, 0.11, 0.09), Surface((44, 38, 36), spare=limb)))
     return parts
 
 
 def _arms() -> list[Mesh]:
     parts = []
     for y, limb in ((0.28, Limb.LEFT_ARM), (-0.28, Limb.RIGHT_ARM)):
-        parts.append(box((0, y, 1.17), (0.12, 0.11, 0.52), WHITE, slot=BodyPart.UPPER, spare=limb, top=1.2))
-        parts.append(box((0, y, 0.86), (0.09, 0.08, 0.14), WHITE, slot=BodyPart.SKIN, spare=limb))
+        parts.append(box((0, y, 1.17), (0.12, 0.11, 0.52), _surface(BodyPart.UPPER, limb), top=1.2))
+        parts.append(box((0, y, 0.86), (0.09, 0.08, 0.14), _surface(BodyPart.SKIN, limb)))
     return parts
 
 
 def _head(sides: int) -> list[Mesh]:
     """Face and hair as bodies of revolution with so many sides."""
-    face = lathe(((0.05, 1.42), (0.11, 1.53), (0.105, 1.67), (0.0, 1.74)), sides, WHITE, slot=BodyPart.SKIN)
-    hair = lathe(((0.12, 1.60), (0.125, 1.69), (0.0, 1.76)), sides, WHITE, at=(-0.025, 0), slot=BodyPart.HAIR)
+    face = lathe(((0.05, 1.42), (0.11, 1.53), (0.105, 1.67), (0.0, 1.74)), sides, _surface(BodyPart.SKIN))
+    hair = lathe(((0.12, 1.60), (0.125, 1.69), (0.0, 1.76)), sides, _surface(BodyPart.HAIR), at=(-0.025, 0))
     return [smooth(face, (0, 0, 1.6)), smooth(hair, (0, 0, 1.6))]

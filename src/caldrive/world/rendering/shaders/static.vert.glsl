@@ -1,4 +1,5 @@
-// Everything that stands still, but for the asphalt. normal.w: the semantic class; color.w: 1 on walls, 0 elsewhere.
+// Everything that stands still, but for the asphalt. normal.w: the semantic class; color.w: 1 on walls
+// and trees, which are shaded by buildings only, 0 elsewhere.
 #include "blocks.glsl"
 
 in vec3 position; in vec3 uv; in vec4 normal; in vec4 color;
