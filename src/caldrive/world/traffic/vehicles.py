@@ -69,7 +69,7 @@ def _take_sumo(traffic: Traffic) -> None:
         gc.collect()  # a world that nobody holds any more may still lie around
     if _driving is not None and _driving() is not None:
         raise RuntimeError(
-            "found another world with traffic in this process, where SUMO can simulate one: "
+            "found another world with traffic in this process, wanted none, as SUMO simulates one at a time: "
             "close() that world first, or give each world a process of its own"
         )
     _driving = weakref.ref(traffic)
@@ -140,7 +140,10 @@ class Traffic:
     def step(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
         """Moves the cars on by dt, under what the lights show now; time in s."""
         if _driving is None or _driving() is not self:
-            raise RuntimeError("found an episode that lost SUMO to a later one: reset its world before the next step")
+            raise RuntimeError(
+                "found an episode that has lost SUMO, which simulates one at a time, wanted a running one: "
+                "call reset(scenario)"
+            )
         self._lights.update()
         front = moved(ego.pose, forward=ego.length / 2)
         angle = 90.0 - math.degrees(ego.pose.heading)
