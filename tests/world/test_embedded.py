@@ -43,8 +43,8 @@ def along_the_street(start: float = 10.0, goal: float = 70.0, **more: Any) -> Sc
     """Straight on, on the longest lane of town02."""
     lane = max(load_roads("town02").driveable, key=lambda lane: lane.line.length).line
     limit = (goal - start) * 0.36
-    places = {"start": lane.pose_at(start), "goal": lane.pose_at(goal)}
-    return Scenario("town02", weather=1, **places, time_limit=limit, **more)
+    first, last = lane.pose_at(start), lane.pose_at(goal)
+    return Scenario("town02", weather=1, start=first, goal=last, time_limit=limit, **more)
 
 
 def around_a_corner(**more: Any) -> Scenario:

@@ -70,7 +70,7 @@ class EmbeddedWorld:
         if self._episode is not None:
             self._episode.close()
         self._episode = None
-        self._put_camera_away()
+        self._close_camera()
 
     @property
     def _current(self) -> Episode:
@@ -128,12 +128,12 @@ class EmbeddedWorld:
     def _camera(self) -> CameraRig:
         """The town's camera rig, made when it is first needed."""
         if self._rig is not None and self._rig.town is not self._current.town:
-            self._put_camera_away()
+            self._close_camera()
         if self._rig is None:
             self._rig = CameraRig(self._current.town)
         return self._rig
 
-    def _put_camera_away(self) -> None:
+    def _close_camera(self) -> None:
         if self._rig is not None:
             self._rig.close()
         self._rig = None

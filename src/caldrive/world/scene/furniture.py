@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -77,20 +77,22 @@ def copies(mesh: Mesh, props: Sequence[Prop], foot: float, scales: Sequence[floa
 
 def _template(kind: str, variant: int, limit: int, appearance: Appearance) -> LodMesh:
     """One prop of a kind at the origin, looking along x."""
-    furniture = appearance.furniture
-    if distractor := furniture.distractor(kind, variant):
+    if distractor := appearance.furniture.distractor(kind, variant):
         return _distractor(distractor)
+    detailed: dict[str, Callable[[], LodMesh]] = {
+        "light_post": _light_post,
+        "sign_post": lambda: _sign_post(limit),
+        "tree": lambda: _tree(appearance.trees[variant]),
+        "lamp": lambda: _lamp(appearance.lamp_arm),
+        "billboard": lambda: _billboard(variant),
+    }
+    return detailed[kind]() if kind in detailed else _simple(kind, variant, appearance)
+
+
+def _simple(kind: str, variant: int, appearance: Appearance) -> LodMesh:
+    """Props of one mesh: large ones are always drawn, small ones only from near."""
+    furniture = appearance.furniture
     hue = furniture.hues[variant % N_VARIANTS]
-    if kind == "light_post":
-        return _light_post()
-    if kind == "sign_post":
-        return _sign_post(limit)
-    if kind == "tree":
-        return _tree(appearance.trees[variant])
-    if kind == "lamp":
-        return _lamp(appearance.lamp_arm)
-    if kind == "billboard":
-        return _billboard(variant)
     large = {
         "hedge": lambda: box((0, 0, 0.62), (0.9, 7.0, 1.36), Surface((86, 122, 62), Tex.LEAVES, tile=2.0)),
         "fence": lambda: box((0, 0, 0.7), (0.08, 8.0, 1.5), Surface(appearance.fence, Tex.BRICKS, tile=3.0)),

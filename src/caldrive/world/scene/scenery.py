@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
@@ -109,27 +110,29 @@ def _buildings(roads: RoadNetwork, appearance: Appearance, rng: np.random.Genera
     variant = rng.integers(N_BUILDING_TYPES, size=n)
     keep_off = roads.roadway.buffer(SIDEWALK_WIDTH + HOUSE_CLEARANCE)
     shapely.prepare(keep_off)
-    center, fits = np.zeros((n, 2)), np.zeros(n, dtype=bool)
+    center, fits = _houses_off(keep_off, middles, outward, depth, width)
+    chosen = np.flatnonzero(built & fits)
+    chosen = chosen[without_overlaps(box_shapes(center[chosen], outward[chosen], depth[chosen], width[chosen]))]
+    for i in chosen:
+        size = (float(depth[i]), float(width[i]), float(floors[i] * layout.floor_height))
+        yield _prop("building", center[i], outward[i], size, int(variant[i]))
+    houses = box_shapes(center[chosen], outward[chosen], depth[chosen] + 0.5, width[chosen] + 0.5)
+    empty = np.setdiff1d(np.arange(n), chosen)
+    occupied = (shapely.union_all(houses), keep_off)
+    yield from _in_gaps(middles[empty], outward[empty], occupied, appearance, rng)
+
+
+def _houses_off(
+    keep_off: shapely.Geometry, middles: Points, outward: Floats, depth: Floats, width: Floats
+) -> tuple[Points, NDArray[np.bool_]]:
+    """Centres (N, 2) of houses on their plots, pushed back until they stay off an area, and whether they do (N,)."""
+    center, fits = np.zeros((len(middles), 2)), np.zeros(len(middles), dtype=bool)
     for back in PUSHED_BACK:
         candidates = beyond(middles, outward, depth / 2 + back)
         free = ~fits & ~shapely.intersects(keep_off, box_shapes(candidates, outward, depth, width))
         center[free] = candidates[free]
         fits |= free
-    chosen = np.flatnonzero(built & fits)
-    chosen = chosen[without_overlaps(box_shapes(center[chosen], outward[chosen], depth[chosen], width[chosen]))]
-    for i in chosen:
-        yield Prop(
-            "building",
-            _facing_road(center[i], outward[i]),
-            length=float(depth[i]),
-            width=float(width[i]),
-            height=float(floors[i] * layout.floor_height),
-            variant=int(variant[i]),
-        )
-    houses = box_shapes(center[chosen], outward[chosen], depth[chosen] + 0.5, width[chosen] + 0.5)
-    empty = np.setdiff1d(np.arange(n), chosen)
-    occupied = (shapely.union_all(houses), keep_off)
-    yield from _in_gaps(middles[empty], outward[empty], occupied, appearance, rng)
+    return center, fits
 
 
 def _in_gaps(
@@ -182,6 +185,7 @@ def _size(kind: str, variant: int, furniture: StreetFurniture) -> tuple[float, f
 
 
 def _prop(kind: str, place: Points, outward: float, size: tuple[float, float, float], variant: int) -> Prop:
+    """A prop that looks at the road, with its length, width and height in m."""
     length, width, height = size
     return Prop(kind, _facing_road(place, outward), length=length, width=width, height=height, variant=variant)
 

@@ -183,11 +183,12 @@ class Traffic:
                 libsumo.vehicle.remove(name)
 
     def _state(self, name: str) -> VehicleState:
+        """A car as SUMO has it, in our axes."""
         _, length, width = self.size[name]
         x, y = libsumo.vehicle.getPosition(name)
         heading = wrap_angle(math.radians(90.0 - libsumo.vehicle.getAngle(name)))
         center = moved(Pose(x, y, heading), forward=-length / 2)
-        return VehicleState(center, libsumo.vehicle.getSpeed(name), length, width, name)
+        return VehicleState(center, libsumo.vehicle.getSpeed(name), length=length, width=width, id=name)
 
     def _read(self) -> tuple[VehicleState, ...]:
         return tuple(self._state(name) for name in libsumo.vehicle.getIDList() if name != EGO)
