@@ -63,7 +63,7 @@ class RecordableWorld(MappedWorld, Protocol):
     """A world that can be seen from anywhere on the car, with labels for each place: for films and recordings."""
 
     def reset(self, scenario: Scenario, *, route: Any = None, appearance: int = 0) -> Observation:
-        """Start an episode, along a route of one's own and in a random look of the town where these are given."""
+        """Start an episode, along a route of one's own and in a random appearance of the town where these are given."""
         ...
 
     def displace(self, left: float, turn: float) -> Observation:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -77,6 +80,30 @@ def test_a_video_has_all_its_frames_at_their_size_and_rate(tmp_path: Path) -> No
     assert [frame.shape for frame in frames] == [(64, 96, 3)] * 6
     assert rate == 10.0
     assert [float(frame.mean()) for frame in frames[::2]] == pytest.approx([40, 120, 200], abs=4)
+
+
+_ENCODE = """
+import hashlib, sys
+from pathlib import Path
+import numpy as np
+from caldrive.visualization.episode_video import VideoWriter
+squares = np.random.default_rng(0).integers(0, 255, (12, 36, 3), dtype=np.uint8).repeat(8, 0).repeat(8, 1)
+path = Path(sys.argv[1])
+with VideoWriter(path) as video:
+    for k in range(12):
+        video.add(np.ascontiguousarray(squares[:, 4 * k : 4 * k + 192]))
+print(hashlib.sha256(path.read_bytes()).hexdigest())
+"""
+
+
+def test_the_same_frames_give_the_same_bytes_whatever_lay_in_memory_before(tmp_path: Path) -> None:
+    digests = []
+    for byte in ("0", "1", "85"):  # glibc fills the memory that it hands out with a byte that follows from this one
+        command = [sys.executable, "-c", _ENCODE, str(tmp_path / f"{byte}.mp4")]
+        environment = {**os.environ, "MALLOC_PERTURB_": byte}
+        digests.append(subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout)
+    assert len(set(digests)) == 1
+    assert len(digests[0].strip()) == 64
 
 
 def test_an_interrupted_video_leaves_no_file(tmp_path: Path) -> None:

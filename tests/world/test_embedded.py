@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from dataclasses import astuple, replace
 from multiprocessing import get_context
 from typing import Any
@@ -23,7 +24,7 @@ from caldrive.interfaces import Agent, World
 from caldrive.results import Outcome
 from caldrive.scenarios import Scenario
 from caldrive.world.embedded import EmbeddedWorld
-from caldrive.world.rendering.lens import mounted
+from caldrive.world.rendering.pinhole import camera_on
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
@@ -34,16 +35,16 @@ NOTHING = Control()
 @pytest.fixture(scope="module")
 def world() -> Iterator[EmbeddedWorld]:
     """A world without a camera."""
-    one = EmbeddedWorld()
-    yield one
-    one.close()
+    with closing(EmbeddedWorld()) as without_camera:
+        yield without_camera
 
 
 def along_the_street(start: float = 10.0, goal: float = 70.0, **more: Any) -> Scenario:
     """Straight on, on the longest lane of town02."""
-    lane = max(load_roads("town02").driveable, key=lambda one: one.line.length).line
+    lane = max(load_roads("town02").driveable, key=lambda lane: lane.line.length).line
     limit = (goal - start) * 0.36
-    return Scenario("town02", 1, lane.pose_at(start), lane.pose_at(goal), time_limit=limit, **more)
+    first, last = lane.pose_at(start), lane.pose_at(goal)
+    return Scenario("town02", weather=1, start=first, goal=last, time_limit=limit, **more)
 
 
 def around_a_corner(**more: Any) -> Scenario:
@@ -55,7 +56,7 @@ def around_a_corner(**more: Any) -> Scenario:
             after = roads.lanes[roads.lanes[turn].successors[0]]
             if roads.lanes[turn].turn is Command.LEFT and lane.length > 32 and not after.internal:
                 start, goal = lane.pose_at(lane.length - 30), after.line.pose_at(min(25.0, after.line.length - 1))
-                return Scenario("town02", 1, start, goal, time_limit=60.0, **more)
+                return Scenario("town02", weather=1, start=start, goal=goal, time_limit=60.0, **more)
     raise AssertionError("town02 has no left turn")
 
 
@@ -64,12 +65,13 @@ def oracle(world: EmbeddedWorld, cap: float | None = 20.0) -> Agent:
 
 
 def drive(world: World, scenario: Scenario, steps: int, control: Control) -> list[Truth]:
+    """The truth at the start of an episode and after each step under a constant control."""
     world.reset(scenario)
-    found = [world.truth()]
+    truths = [world.truth()]
     for _ in range(steps):
         world.step(control)
-        found.append(world.truth())
-    return found
+        truths.append(world.truth())
+    return truths
 
 
 def test_an_episode_begins_at_rest_at_its_start_at_time_0(world: EmbeddedWorld) -> None:
@@ -130,9 +132,11 @@ def test_the_progress_ends_at_the_goal(world: EmbeddedWorld) -> None:
 def test_the_lawful_limit_changes_at_the_signs(world: EmbeddedWorld, town01: RoadNetwork) -> None:
     fast = next(sign for sign in town01.signs if sign.limit == 60)
     lane, _s = town01.lane_at(moved(fast.pose, left=3.1))
-    before = next(one for one in town01.driveable if lane.id in one.successors or via_leads_to(town01, one.id, lane.id))
+    before = next(
+        each for each in town01.driveable if lane.id in each.successors or via_leads_to(town01, each.id, lane.id)
+    )
     start = before.line.pose_at(before.line.length - 10)
-    scenario = Scenario("town01", 1, start, lane.line.pose_at(lane.line.length - 1))
+    scenario = Scenario("town01", weather=1, start=start, goal=lane.line.pose_at(lane.line.length - 1))
     truths = drive(world, scenario, 70, Control(throttle=0.8))
     there = plan_route(town01, start, scenario.goal).line.project(fast.pose.x, fast.pose.y).s
     assert (
@@ -162,10 +166,7 @@ def test_a_car_across_the_centre_line_is_on_the_opposite_lane(world: EmbeddedWor
 
 
 def test_the_command_comes_before_the_junction_and_goes_behind_it(world: EmbeddedWorld) -> None:
-    commands = []
-    step = run_steps(world, around_a_corner())
-    for one in step:
-        commands.append(one.observation.command)
+    commands = [step.observation.command for step in run_steps(world, around_a_corner())]
     changes = [a for a, b in zip(commands, [None, *commands], strict=False) if a is not b]
     assert changes == [Command.STRAIGHT, Command.LEFT, Command.STRAIGHT]
 
@@ -207,11 +208,11 @@ def test_a_turned_camera_has_the_labels_of_a_car_whose_camera_takes_the_same_pic
 ) -> None:
     drive(world, along_the_street(n_vehicles=10, n_pedestrians=20), 30, Control(throttle=0.4))
     mount = CameraConfig(left=0.5, yaw=yaw)
-    lens, labels = mounted(world.truth().ego, mount).pose, world.labels_at(mount)
-    car = to_local(world.truth().ego.pose, np.array([astuple(moved(lens, forward=-mount.forward))[:2]]))[0]
+    camera, labels = camera_on(world.truth().ego, mount).pose, world.labels_at(mount)
+    car = to_local(world.truth().ego.pose, np.array([astuple(moved(camera, forward=-mount.forward))[:2]]))[0]
     world.displace(float(car[1]), yaw)
-    own = mounted(world.truth().ego, CameraConfig()).pose
-    assert to_local(lens, np.array([astuple(own)[:2]]))[0] == pytest.approx((-float(car[0]), 0.0), abs=0.06)
+    own = camera_on(world.truth().ego, CameraConfig()).pose
+    assert to_local(camera, np.array([astuple(own)[:2]]))[0] == pytest.approx((-float(car[0]), 0.0), abs=0.06)
     true = world.truth().affordances
     assert true.center_distance == pytest.approx(labels.center_distance, abs=0.01)
     assert true.relative_angle == pytest.approx(labels.relative_angle, abs=0.01)
@@ -225,21 +226,20 @@ def test_two_episodes_of_one_scenario_are_equal(world: EmbeddedWorld) -> None:
 
 
 def test_another_seed_is_another_episode(world: EmbeddedWorld) -> None:
-    one, two = (drive(world, along_the_street(n_vehicles=15, n_pedestrians=50, seed=s), 0, NOTHING) for s in (3, 4))
-    assert one[0].vehicles != two[0].vehicles
-    assert one[0].pedestrians != two[0].pedestrians
-    assert one[0].ego == two[0].ego
+    third, fourth = (
+        drive(world, along_the_street(n_vehicles=15, n_pedestrians=50, seed=seed), 0, NOTHING)[0] for seed in (3, 4)
+    )
+    assert third.vehicles != fourth.vehicles
+    assert third.pedestrians != fourth.pedestrians
+    assert third.ego == fourth.ego
 
 
 def test_a_closed_world_can_be_entered_again(world: EmbeddedWorld) -> None:
-    world.close()
-    one = EmbeddedWorld()
     scenario = along_the_street(n_vehicles=5)
-    first = drive(one, scenario, 5, NOTHING)
-    one.close()
-    one.close()
-    assert drive(one, scenario, 5, NOTHING) == first
-    one.close()
+    first = drive(world, scenario, 5, NOTHING)
+    world.close()
+    world.close()
+    assert drive(world, scenario, 5, NOTHING) == first
 
 
 @pytest.mark.parametrize(
@@ -260,15 +260,16 @@ def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], message: s
 def digests_of_a_drive() -> list[str]:
     """Digests of images, controls and truths of a short drive of the oracle."""
     world = EmbeddedWorld(CameraConfig(width=100, height=44))
-    agent, found = oracle(world), []
+    agent, digests = oracle(world), []
     observation = world.reset(along_the_street(n_vehicles=15, n_pedestrians=30, seed=5))
     agent.reset()
     for _ in range(15):
         control = agent.act(observation)
-        found.append(hashlib.sha256(observation.image.tobytes() + repr((control, world.truth())).encode()).hexdigest())
+        content = observation.image.tobytes() + repr((control, world.truth())).encode()
+        digests.append(hashlib.sha256(content).hexdigest())
         observation = world.step(control)
     world.close()
-    return found
+    return digests
 
 
 def test_two_processes_see_and_do_the_same_to_the_last_bit() -> None:

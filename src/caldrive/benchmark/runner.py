@@ -32,7 +32,7 @@ from caldrive.scenarios import Scenario
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
-from caldrive.world.traffic.pedestrians import require_room
+from caldrive.world.traffic.sidewalks import require_room
 from caldrive.world.traffic.vehicles import free_places
 
 

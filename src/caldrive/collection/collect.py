@@ -25,7 +25,7 @@ from caldrive.provenance import code_version
 from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, episode_path
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
-from caldrive.world.traffic import pedestrians
+from caldrive.world.traffic import sidewalks
 from caldrive.world.traffic import vehicles as traffic
 
 LIMITS = {  # of the options that are numbers
@@ -85,7 +85,7 @@ def _check(config: CollectConfig, workers: int) -> None:
     for number in config.weathers:
         weather(number)
     roads = load_roads(config.town)
-    for name, most in {"cars": traffic.room(roads), "people": pedestrians.room(roads)}.items():
+    for name, most in {"cars": traffic.room(roads), "people": sidewalks.room(roads)}.items():
         require_within(f"--{name}", values[name], 0, most, min(most, usual[name]))
 
 

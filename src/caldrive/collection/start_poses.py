@@ -88,7 +88,7 @@ def plan_episode(config: CollectConfig, number: int, rng: np.random.Generator) -
         n_pedestrians=config.people, time_limit=config.duration, seed=int(rng.integers(2**31)), task="collect",
         crossing=config.crossing,
     )  # fmt: skip
-    return EpisodePlan(scenario=scenario, route=route, appearance=town.appearance, tailgating=tailgating)
+    return EpisodePlan(scenario=scenario, route=route, appearance=town.appearance.number, tailgating=tailgating)
 
 
 def _cars(config: CollectConfig, tailgating: bool, most: int, rng: np.random.Generator) -> int:

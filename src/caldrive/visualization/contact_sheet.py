@@ -16,7 +16,7 @@ from caldrive.checks import MOST_PIXELS, require_within, require_writable_file
 from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.files import write_whole
 from caldrive.geometry import moved
-from caldrive.world.rendering.camera import CameraRig, Shot
+from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import WEATHERS
@@ -99,8 +99,8 @@ def _views(camera: CameraRig, roads: RoadNetwork, weather: int, size: tuple[int,
     lights = {post.id: states[(k + 2) % 3] for k, post in enumerate(roads.posts)}
     for name, pose in viewpoints(roads):
         cars, people = cars_and_people(pose)
-        shot = Shot(weather, VehicleState(pose), cars, people, lights, time=1.0)
-        yield name, camera.render(shot, [CameraConfig(*size)])[0]
+        state = SceneState(weather, VehicleState(pose), cars, people, lights, time=1.0)
+        yield name, camera.render(state, [CameraConfig(*size)])[0]
 
 
 def write_sheet(town: str, path: Path, width: int | None = None, randomised: int = 0) -> tuple[int, int]:

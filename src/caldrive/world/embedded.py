@@ -11,24 +11,25 @@ from caldrive.datatypes import DT, Affordances, Alternative, CameraConfig, Contr
 from caldrive.scenarios import Scenario
 from caldrive.timing import Stopwatch, Timed, untimed
 from caldrive.world.episode import Episode
-from caldrive.world.rendering.camera import CameraRig, Shot
+from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route, plan_route
 from caldrive.world.scene.weather import weather
 from caldrive.world.town import Town, load_town
 from caldrive.world.traffic.ego import VehicleConfig
 
-NO_IMAGE = np.zeros((1, 1, 3), np.uint8)
+NO_IMAGE = np.zeros((1, 1, 3), np.uint8)  # a black pixel
 
 
 class EmbeddedWorld:
-    """Implements `RecordableWorld`.
+    """A town with traffic, pedestrians, lights and cameras; implements `RecordableWorld`.
 
-    camera: the agent's; None drives without images (a black pixel stands for them), for the oracle. stopwatch: to
-    measure the parts of a step with.
+    camera: the agent's; None drives without images (a black pixel stands for them), for the oracle. vehicle: the ego.
+    stopwatch: to measure the parts of a step with. A process may have several worlds, but only one of them traffic.
     """
 
     dt = DT
+    """s of one step."""
 
     def __init__(
         self,
@@ -42,7 +43,7 @@ class EmbeddedWorld:
         self._rig: CameraRig | None = None
 
     def reset(self, scenario: Scenario, *, route: Route | None = None, appearance: int = 0) -> Observation:
-        """Starts an episode. route: instead of the shortest way; appearance: see `Town`.
+        """Starts an episode. route: instead of the shortest way; appearance: see `load_town`.
 
         Raises ValueError or FileNotFoundError for a scenario that cannot be, RuntimeError where another world of this
         process has traffic.
@@ -57,79 +58,90 @@ class EmbeddedWorld:
 
     def step(self, control: Control) -> Observation:
         """Moves everything on by dt."""
-        self._now.step(control)
+        self._current.step(control)
         return self._observe()
 
     def truth(self) -> Truth:
         """What really is, now."""
-        return self._now.truth
+        return self._current.truth
 
     def close(self) -> None:
         """Ends the simulation and frees the camera."""
         if self._episode is not None:
             self._episode.close()
         self._episode = None
-        self._put_camera_away()
+        self._close_camera()
 
     @property
-    def _now(self) -> Episode:
+    def _current(self) -> Episode:
         if self._episode is None:
             raise RuntimeError("found a world before its first episode, wanted one: call reset(scenario)")
         return self._episode
 
     @property
     def town(self) -> Town:
-        return self._now.town
+        """Where the episode is."""
+        return self._current.town
 
     @property
     def roads(self) -> RoadNetwork:
-        return self._now.town.roads
+        """The town's."""
+        return self._current.town.roads
 
     @property
     def route(self) -> Route:
-        return self._now.route
+        """From the start to the goal of the episode."""
+        return self._current.route
 
     def displace(self, left: float, turn: float) -> Observation:
         """Puts the ego some metres to the left and turns it (rad)."""
-        self._now.displace(left, turn)
+        self._current.displace(left, turn)
         return self._observe()
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
         """What cameras on the ego see now, (H, W, 3) each."""
-        return self._camera().render(self._shot(), mounts)
+        return self._camera().render(self._scene(), mounts)
 
     def semantic_images(self, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
         """What each pixel of `images` shows, (H, W) each, as numbers of `Semantic`."""
-        return self._camera().render_semantics(self._shot(), mounts)
+        return self._camera().render_semantics(self._scene(), mounts)
 
     def labels_at(self, mount: CameraConfig) -> Affordances:
         """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
-        return self._now.labels.label_at(mount, self._now.moment)
+        return self._current.labels.label_at(mount, self._current.state)
 
     def other_commands_at(self, mount: CameraConfig) -> list[Alternative]:
         """What other commands would ask of such a car, where others could be given."""
-        return self._now.labels.other_commands_at(mount, self._now.moment)
+        return self._current.labels.other_commands_at(mount, self._current.state)
 
-    def _shot(self) -> Shot:
-        now = self._now.moment
-        states = {light.id: light.state for light in now.lights}
-        return Shot(self._now.scenario.weather, now.ego, now.vehicles, now.pedestrians, states, now.time)
+    def _scene(self) -> SceneState:
+        state = self._current.state
+        return SceneState(
+            weather=self._current.scenario.weather,
+            ego=state.ego,
+            vehicles=state.vehicles,
+            pedestrians=state.pedestrians,
+            lights={light.id: light.state for light in state.lights},
+            time=state.time,
+        )
 
     def _camera(self) -> CameraRig:
         """The town's camera rig, made when it is first needed."""
-        if self._rig is not None and self._rig.town is not self._now.town:
-            self._put_camera_away()
+        if self._rig is not None and self._rig.town is not self._current.town:
+            self._close_camera()
         if self._rig is None:
-            self._rig = CameraRig(self._now.town)
+            self._rig = CameraRig(self._current.town)
         return self._rig
 
-    def _put_camera_away(self) -> None:
+    def _close_camera(self) -> None:
         if self._rig is not None:
             self._rig.close()
         self._rig = None
 
     def _observe(self) -> Observation:
-        now = self._now.moment
+        state = self._current.state
         with self._timed("camera"):
             image = self.images([self.mount])[0] if self.mount is not None else NO_IMAGE
-        return Observation(now.time, image, now.ego.speed, self.route.command_at(now.progress))
+        return Observation(
+            time=state.time, image=image, speed=state.ego.speed, command=self.route.command_at(state.progress)
+        )

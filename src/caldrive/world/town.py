@@ -12,44 +12,47 @@ from caldrive.geometry import wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route
 from caldrive.world.roads.towns import load_roads
-from caldrive.world.scene.decor import Decor
-from caldrive.world.scene.domain_randomisation import randomised_decor, shown_signs
+from caldrive.world.scene.appearance import Appearance
+from caldrive.world.scene.domain_randomisation import town_appearance, town_signs
 from caldrive.world.scene.scenery import Prop, build_scenery
 from caldrive.world.traffic.collisions import Obstacle
 from caldrive.world.truth.ground_raster import GroundRaster
 
 CLOSE = 4.0  # m from the ego's centre to an obstacle's edge within which a contact is looked for
 SIGN_BESIDE = (-7.0, -1.0)  # m left of the route where a sign that counts for it stands
+SAME_WAY = 0.5  # rad at most between the route and the traffic that such a sign faces
 
 
 class Obstacles:
     """What stands still and can be hit, with an index of where it is."""
 
     def __init__(self, scenery: tuple[Prop, ...]) -> None:
-        solid = [prop for prop in scenery if prop.solid]
-        self._things = [
-            Obstacle(ContactKind.OBJECT, f"{p.kind}{i}", p.pose, p.length, p.width) for i, p in enumerate(solid)
+        self._boxes = [
+            Obstacle(ContactKind.OBJECT, f"{prop.kind}{i}", prop.pose, length=prop.length, width=prop.width)
+            for i, prop in enumerate(scenery)
         ]
-        self._at: Points = np.array([(o.pose.x, o.pose.y) for o in self._things]).reshape(-1, 2)
-        self._reach = np.array([np.hypot(o.length, o.width) / 2 for o in self._things])
+        self._at: Points = np.array([(box.pose.x, box.pose.y) for box in self._boxes]).reshape(-1, 2)
+        self._reach = np.array([np.hypot(box.length, box.width) / 2 for box in self._boxes])
 
     def near(self, x: float, y: float) -> list[Obstacle]:
-        """Those that a car with its centre here may touch."""
+        """Those that a car with its centre here (m) may touch."""
         distance = np.hypot(self._at[:, 0] - x, self._at[:, 1] - y) - self._reach
-        return [self._things[i] for i in np.flatnonzero(distance < CLOSE)]
+        return [self._boxes[i] for i in np.flatnonzero(distance < CLOSE)]
 
 
 @dataclass(frozen=True, eq=False)
 class Town:
-    """Everything in a town that stands still. appearance: number of a random look (houses, trees, colours, sun, limits
-    of the fast streets), 0 for the town's own."""
+    """Everything in a town that stands still."""
 
     name: str
-    appearance: int
+    """As in a scenario: a name or the path of an OpenDRIVE file."""
+    appearance: Appearance
+    """Its number is 0 for the town's own, else that of a random one."""
     roads: RoadNetwork
+    """The same in every appearance."""
     signs: tuple[Sign, ...]
+    """As they are in this appearance: limits of fast streets differ."""
     scenery: tuple[Prop, ...]
-    decor: Decor
     ground: GroundRaster
     obstacles: Obstacles
 
@@ -59,7 +62,7 @@ class Town:
         low, high = SIGN_BESIDE
         for sign in self.signs:
             hit = route.line.project(sign.pose.x, sign.pose.y)
-            if low < hit.left < high and abs(wrap_angle(hit.heading - sign.pose.heading)) < 0.5:
+            if low < hit.left < high and abs(wrap_angle(hit.heading - sign.pose.heading)) < SAME_WAY:
                 limits.append((hit.s, float(sign.limit)))
         return sorted(limits)
 
@@ -71,16 +74,19 @@ def _ground(roads: RoadNetwork) -> GroundRaster:
 
 @lru_cache(maxsize=2)
 def load_town(name: str, appearance: int = 0) -> Town:
-    """A town by name or OpenDRIVE file. Raises ValueError or FileNotFoundError where there is none."""
+    """A town by name or OpenDRIVE file. appearance: the number of a random appearance (domain randomisation: other
+    houses, trees, colours, sun, limits of the fast streets), 0 for the town's own.
+
+    Raises ValueError or FileNotFoundError where there is none.
+    """
     roads = load_roads(name)
     scenery = build_scenery(roads, appearance)
     return Town(
         name=name,
-        appearance=appearance,
+        appearance=town_appearance(roads.appearance, appearance),
         roads=roads,
-        signs=shown_signs(roads.signs, appearance),
+        signs=town_signs(roads.signs, appearance),
         scenery=scenery,
-        decor=randomised_decor(roads.style, appearance),
         ground=_ground(roads),
         obstacles=Obstacles(scenery),
     )

@@ -7,7 +7,7 @@ import pytest
 
 from caldrive.datatypes import CameraConfig, PedestrianState, Semantic, VehicleState
 from caldrive.geometry import moved
-from caldrive.world.rendering.camera import CameraRig, Shot
+from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.towns import load_roads
 
@@ -29,10 +29,8 @@ def approach(roads: RoadNetwork) -> VehicleState:
 def test_a_car_and_a_person_are_where_the_picture_changes(camera: CameraRig, approach: VehicleState) -> None:
     car = VehicleState(moved(approach.pose, forward=12, left=0.3), id="a")
     person = PedestrianState(moved(approach.pose, forward=9, left=3.0, turn=1.5), 1.0, on_road=True, id="b")
-    empty, full = (
-        camera.render(Shot(1, approach, c, p, {}, 0.0), [MOUNT])[0] for c, p in (((), ()), ([car], [person]))
-    )
-    kinds = camera.render_semantics(Shot(1, approach, [car], [person]), [MOUNT])[0]
+    empty, full = (camera.render(SceneState(1, approach, c, p), [MOUNT])[0] for c, p in (((), ()), ([car], [person])))
+    kinds = camera.render_semantics(SceneState(1, approach, [car], [person]), [MOUNT])[0]
     changed = np.abs(full.astype(int) - empty).max(axis=2) > 12
     for kind in (Semantic.VEHICLE, Semantic.PERSON):
         assert (kinds == kind).sum() > 150
@@ -42,15 +40,15 @@ def test_a_car_and_a_person_are_where_the_picture_changes(camera: CameraRig, app
 
 
 def test_signs_lights_and_streets_are_told_apart(camera: CameraRig, roads: RoadNetwork, approach: VehicleState) -> None:
-    kinds = camera.render_semantics(Shot(1, approach, (), ()), [MOUNT])[0]
+    kinds = camera.render_semantics(SceneState(1, approach), [MOUNT])[0]
     assert kinds[-1, 200] in (Semantic.ROAD, Semantic.LINE)
     assert set(np.unique(kinds)) >= {Semantic.SIGN, Semantic.SIDEWALK, Semantic.BUILDING, Semantic.LINE}
     lane = roads.lanes[roads.posts[0].lane]
     before = VehicleState(lane.line.pose_at(lane.line.length - 12))
-    assert Semantic.LIGHT in camera.render_semantics(Shot(1, before, (), ()), [MOUNT])[0]
+    assert Semantic.LIGHT in camera.render_semantics(SceneState(1, before), [MOUNT])[0]
 
 
 def test_looking_at_classes_changes_no_picture(camera: CameraRig, approach: VehicleState) -> None:
-    first = camera.render(Shot(3, approach, (), (), {}, 0.0), [MOUNT])[0]
-    camera.render_semantics(Shot(1, approach, (), ()), [MOUNT])
-    assert (camera.render(Shot(3, approach, (), (), {}, 0.0), [MOUNT])[0] == first).all()
+    first = camera.render(SceneState(3, approach), [MOUNT])[0]
+    camera.render_semantics(SceneState(1, approach), [MOUNT])
+    assert (camera.render(SceneState(3, approach), [MOUNT])[0] == first).all()

@@ -7,32 +7,34 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import shapely
 
 from caldrive.datatypes import Command, Pose, Sign
 from caldrive.geometry import moved, to_local, wrap_angle
-from caldrive.world.roads.network import SIDEWALK_WIDTH, Lane, RoadNetwork, read_roads
+from caldrive.world.roads.network import SIDEWALK_WIDTH, Lane, RoadNetwork
+from caldrive.world.roads.sumo_reader import read_roads
 from caldrive.world.truth.labels import A1
 
 
 def lane_beside(roads: RoadNetwork, sign: Sign) -> tuple[Lane, float, float]:
     """The closest lane whose traffic a sign faces, the arc length on it, and how far left of it the sign stands."""
-    found = []
+    beside = []
     for lane in roads.driveable:
         hit = lane.line.project(sign.pose.x, sign.pose.y)
         if abs(wrap_angle(hit.heading - sign.pose.heading)) < 0.3:
-            found.append((abs(hit.left), lane, hit.s, hit.left))
-    _, lane, s, left = min(found, key=lambda one: one[0])
+            beside.append((abs(hit.left), lane, hit.s, hit.left))
+    _, lane, s, left = min(beside, key=lambda row: row[0])
     return lane, s, left
 
 
 def steps_back(roads: RoadNetwork, lane: Lane, reach: float) -> list[Lane]:
     """The lane and those before it, over a distance back from its end."""
-    before = {after: one for one in roads.lanes.values() for after in one.successors}
-    found, covered = [lane], lane.line.length
+    before = {successor: each for each in roads.lanes.values() for successor in each.successors}
+    lanes, covered = [lane], lane.line.length
     while covered < reach and (lane := before[lane.id]):
-        found.append(lane)
+        lanes.append(lane)
         covered += lane.line.length
-    return found
+    return lanes
 
 
 def end_of(lane: Lane) -> Pose:
@@ -65,7 +67,7 @@ def test_lanes_lead_on_without_a_kink(town: RoadNetwork) -> None:
 
 def test_an_approach_to_a_t_junction_has_exactly_two_different_turns(town: RoadNetwork) -> None:
     for post in town.posts:
-        turns = [town.lanes[one].turn for one in town.lanes[post.lane].successors]
+        turns = [town.lanes[id].turn for id in town.lanes[post.lane].successors]
         assert len(turns) == len(set(turns)) == 2
         assert None not in turns
 
@@ -73,7 +75,7 @@ def test_an_approach_to_a_t_junction_has_exactly_two_different_turns(town: RoadN
 def test_each_junction_offers_every_turn_twice(town: RoadNetwork) -> None:
     for light in {post.light for post in town.posts}:
         lanes = [town.lanes[post.lane] for post in town.posts if post.light == light]
-        turns = Counter(town.lanes[one].turn for lane in lanes for one in lane.successors)
+        turns = Counter(town.lanes[id].turn for lane in lanes for id in lane.successors)
         assert turns == dict.fromkeys(Command, 2)
 
 
@@ -118,9 +120,9 @@ def test_every_rise_and_fall_of_the_limit_on_a_street_has_its_sign(town: RoadNet
     signed = {lane_beside(town, sign)[0].id for sign in town.signs}
     changes = 0
     for lane in town.driveable:
-        following = [town.lanes[one] for one in lane.successors]
-        while following and all(one.internal and one.turn is None for one in following):
-            following = [town.lanes[one] for inner in following for one in inner.successors]
+        following = [town.lanes[id] for id in lane.successors]
+        while following and all(after.internal and after.turn is None for after in following):
+            following = [town.lanes[id] for inner in following for id in inner.successors]
         for after in following:
             if not after.internal and round(after.limit) != round(lane.limit):
                 assert after.id in signed
@@ -146,13 +148,11 @@ def test_stop_lines_run_across_the_end_of_the_lane_from_left_to_right(town: Road
 
 def test_a_post_tells_the_links_of_its_lane(town: RoadNetwork) -> None:
     for post in town.posts:
-        lights = {town.lanes[one].light for one in town.lanes[post.lane].successors}
+        lights = {town.lanes[id].light for id in town.lanes[post.lane].successors}
         assert lights == {(post.light, link) for link in post.links}
 
 
 def test_posts_and_signs_stand_on_the_sidewalk(town: RoadNetwork) -> None:
-    import shapely
-
     poses = [post.pose for post in town.posts] + [sign.pose for sign in town.signs]
     assert all(town.sidewalk.covers(shapely.Point(pose.x, pose.y)) for pose in poses)
 
@@ -164,8 +164,6 @@ def test_roadway_and_sidewalk_are_valid_and_do_not_overlap(town: RoadNetwork) ->
 
 
 def test_the_roadway_holds_every_lane_and_a_sidewalk_lines_every_street(town: RoadNetwork) -> None:
-    import shapely
-
     for lane in town.lanes.values():
         middle = lane.line.pose_at(lane.line.length / 2)
         assert town.roadway.covers(shapely.Point(middle.x, middle.y))
@@ -181,8 +179,8 @@ def test_bounds_enclose_the_whole_roadway(town01: RoadNetwork) -> None:
 def test_the_lane_under_a_pose_is_the_one_that_runs_its_way(town01: RoadNetwork) -> None:
     for lane in town01.driveable[:20]:
         here = moved(lane.line.pose_at(lane.line.length / 2), left=0.8)
-        found, s = town01.lane_at(here)
-        assert found.id == lane.id
+        below, s = town01.lane_at(here)
+        assert below.id == lane.id
         assert s == pytest.approx(lane.line.length / 2, abs=0.1)
         opposite, _ = town01.lane_at(moved(here, left=1.5, turn=math.pi))
         assert opposite.id != lane.id
@@ -197,12 +195,12 @@ def test_a_pose_off_the_road_or_across_it_is_on_no_lane(pose: Pose, town01: Road
 def test_standing_posts_are_given_to_the_approach_that_they_face(town02: RoadNetwork) -> None:
     shifted = [moved(post.pose, forward=4.0, left=-0.7) for post in town02.posts]
     away = [moved(pose, turn=math.pi) for pose in shifted]
-    again = read_roads("again", town02.network, "town02", posts=[*away, *shifted], signs=[])
-    found = {post.lane: post.pose for post in again.posts}
-    assert found == {post.lane: pose for post, pose in zip(town02.posts, shifted, strict=True)}
+    again = read_roads("again", town02.network, appearance="town02", posts=[*away, *shifted], signs=[])
+    poses = {post.lane: post.pose for post in again.posts}
+    assert poses == {post.lane: pose for post, pose in zip(town02.posts, shifted, strict=True)}
     assert again.signs == ()
 
 
 def test_an_approach_without_a_standing_post_has_no_light(town02: RoadNetwork) -> None:
-    again = read_roads("again", town02.network, "town02", posts=[town02.posts[0].pose], signs=[])
+    again = read_roads("again", town02.network, appearance="town02", posts=[town02.posts[0].pose], signs=[])
     assert [post.lane for post in again.posts] == [town02.posts[0].lane]

@@ -14,9 +14,9 @@ from caldrive.world.roads.opendrive import read_furniture
 from tests.maps import sign_at, write_map
 
 
-def assert_pose(found: Pose, wanted: Pose) -> None:
-    assert (found.x, found.y) == pytest.approx((wanted.x, wanted.y), abs=0.01)
-    assert abs(wrap_angle(found.heading - wanted.heading)) < 1e-3
+def assert_pose(pose: Pose, wanted: Pose) -> None:
+    assert (pose.x, pose.y) == pytest.approx((wanted.x, wanted.y), abs=0.01)
+    assert abs(wrap_angle(pose.heading - wanted.heading)) < 1e-3
 
 
 def test_a_sign_right_of_a_straight_road_faces_the_traffic_along_it(tmp_path: Path) -> None:
@@ -94,10 +94,10 @@ def test_a_sign_stands_on_the_right_piece_of_a_road_of_several(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("", "no readable OpenDRIVE map"),
-        ("<OpenDRIVE><road>", "no readable OpenDRIVE map"),
-        ("a drawing", "no readable OpenDRIVE map"),
-        ("<osm/>", "holds <osm>, wanted <OpenDRIVE>"),
+        ("", "is no OpenDRIVE map"),
+        ("<OpenDRIVE><road>", "is no OpenDRIVE map"),
+        ("a drawing", "is no OpenDRIVE map"),
+        ("<osm/>", "found <osm> in .*, wanted <OpenDRIVE>"),
     ],
     ids=["empty", "cut off", "no xml", "another format"],
 )
@@ -110,12 +110,12 @@ def test_a_file_that_is_no_map_says_so(content: str, message: str, tmp_path: Pat
 
 @pytest.mark.parametrize("geometry", ["", '<geometry s="0" x="0" y="0" hdg="0" length="9"/>'], ids=["none", "bare"])
 def test_a_road_without_a_reference_line_says_so(geometry: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="no readable OpenDRIVE map"):
+    with pytest.raises(ValueError, match="is no OpenDRIVE map"):
         read_furniture(write_map(tmp_path, geometry, sign_at(5)))
 
 
 def test_a_number_that_is_none_says_so(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="no readable OpenDRIVE map"):
+    with pytest.raises(ValueError, match="is no OpenDRIVE map"):
         read_furniture(write_map(tmp_path, signals='<signal s="here" t="-5" type="274" value="30"/>'))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import networkx as nx
@@ -47,7 +48,7 @@ def test_a_route_goes_on_behind_its_goal(town: RoadNetwork) -> None:
 
 
 def test_a_start_beside_the_centre_line_gives_the_route_along_it(town01: RoadNetwork) -> None:
-    lane = max(town01.driveable, key=lambda one: one.line.length)
+    lane = max(town01.driveable, key=lambda lane: lane.line.length)
     start, goal = lane.line.pose_at(5.0), lane.line.pose_at(25.0)
     route = plan_route(town01, moved(start, left=1.0, turn=0.3), goal)
     assert route.length == pytest.approx(20.0, abs=0.1)
@@ -55,7 +56,7 @@ def test_a_start_beside_the_centre_line_gives_the_route_along_it(town01: RoadNet
 
 
 def test_a_goal_behind_the_start_on_the_same_lane_takes_a_way_around(town01: RoadNetwork) -> None:
-    lane = max(town01.driveable, key=lambda one: one.line.length)
+    lane = max(town01.driveable, key=lambda lane: lane.line.length)
     route = plan_route(town01, lane.line.pose_at(25.0), lane.line.pose_at(5.0))
     assert route.length > 200
     assert route.lanes[0][0] == lane.id
@@ -124,7 +125,7 @@ def test_before_the_first_command_the_command_is_straight(town01: RoadNetwork) -
 
 
 def test_a_route_has_time_at_10_kmh(town01: RoadNetwork) -> None:
-    route = Route(plan_route(town01, *some_routes(town01, 1)[0][:2]).line, 100.0, (), ())
+    route = Route(plan_route(town01, *some_routes(town01, 1)[0][:2]).line, length=100.0, turns=(), lanes=())
     assert route.time_limit == pytest.approx(36.0)
 
 
@@ -150,8 +151,6 @@ def test_a_start_or_goal_off_the_road_is_refused(off: Pose, town01: RoadNetwork)
 
 
 def test_a_goal_that_no_lane_leads_to_is_refused(town01: RoadNetwork) -> None:
-    from dataclasses import replace
-
     first, last = town01.driveable[0], town01.driveable[-1]
     cut = replace(town01, lanes=dict(town01.lanes) | {first.id: replace(first, successors=())})
     with pytest.raises(ValueError, match="found no way from"):

@@ -1,4 +1,4 @@
-"""The 14 weathers and the looks that follow from them."""
+"""The 14 weathers and the lighting that follows from them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.world.scene.weather import WEATHERS, fog_density, look, sun_direction, sunlight, weather
+from caldrive.world.scene.weather import WEATHERS, fog_density, lighting, sun_direction, sunlight, weather
 
 IDS = st.sampled_from(sorted(WEATHERS))
 
@@ -23,12 +23,12 @@ def test_an_unknown_weather_is_refused_in_one_sentence() -> None:
 
 
 @given(IDS, st.floats(0, 6.28))
-def test_every_look_can_be_shown(id: int, azimuth: float) -> None:
-    made = look(weather(id), azimuth)
-    assert np.isclose(np.linalg.norm(made.sun_direction), 1)
-    for color in (made.sky_ambient, made.ground_ambient, made.zenith, made.horizon):
+def test_all_lighting_can_be_shown(id: int, azimuth: float) -> None:
+    light = lighting(weather(id), azimuth)
+    assert np.isclose(np.linalg.norm(light.sun_direction), 1)
+    for color in (light.sky_ambient, light.ground_ambient, light.zenith, light.horizon):
         assert np.all((color > 0.1) & (color <= 1.0))
-    assert np.all(made.sun >= 0)
+    assert np.all(light.sun >= 0)
 
 
 def test_the_sun_stands_where_it_is_told_to() -> None:
@@ -47,9 +47,9 @@ def test_hard_rain_hides_more_than_a_clear_day() -> None:
 
 
 def test_no_two_weathers_look_alike() -> None:
-    looks = [look(weather(i), 1.0) for i in WEATHERS]
+    all_lighting = [lighting(weather(id), 1.0) for id in WEATHERS]
     rows = np.array(
-        [(*k.sun, *k.sky_ambient, *k.horizon, k.wetness, k.puddles, k.rain, 50 * k.fog_density) for k in looks]
+        [(*k.sun, *k.sky_ambient, *k.horizon, k.wetness, k.puddles, k.rain, 50 * k.fog_density) for k in all_lighting]
     )
     gaps = np.abs(rows[:, None] - rows[None]).max(axis=2) + np.eye(len(rows))
     assert gaps.min() > 0.05

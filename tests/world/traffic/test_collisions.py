@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from caldrive.datatypes import ContactKind, PedestrianState, Pose, VehicleState
 from caldrive.geometry import box_corners, boxes_overlap, push_out
 from caldrive.world.traffic.collisions import CAR_MASS, PERSON_MASS, Obstacle, obstacle_of, resolve
 
-EGO = VehicleState(Pose(0, 0, 0), 8.0, 4.2, 1.8, "ego")
+EGO = VehicleState(Pose(0, 0, 0), speed=8.0, length=4.2, width=1.8, id="ego")
 boxes = st.builds(
     lambda x, y, heading, length, width: box_corners(Pose(x, y, heading), length, width),
     st.floats(-4, 4), st.floats(-4, 4), st.floats(-3.1, 3.1), st.floats(0.3, 6), st.floats(0.3, 6),
@@ -21,25 +22,25 @@ boxes = st.builds(
 
 
 def ego(speed: float, heading: float = 0.0) -> VehicleState:
-    return VehicleState(Pose(0, 0, heading), speed, 4.2, 1.8, "ego")
+    return replace(EGO, pose=Pose(0, 0, heading), speed=speed)
 
 
 def wall(x: float, y: float, length: float = 0.4, width: float = 20.0) -> Obstacle:
-    return Obstacle(ContactKind.OBJECT, "wall", Pose(x, y, 0.0), length, width)
+    return Obstacle(ContactKind.OBJECT, "wall", Pose(x, y, 0.0), length=length, width=width)
 
 
 def car(x: float, y: float, speed: float = 0.0, heading: float = 0.0) -> Obstacle:
-    return obstacle_of(VehicleState(Pose(x, y, heading), speed, 4.2, 1.8, "car"))
+    return obstacle_of(VehicleState(Pose(x, y, heading), speed, length=4.2, width=1.8, id="car"))
 
 
 def person(x: float, y: float) -> Obstacle:
     return obstacle_of(PedestrianState(Pose(x, y, 0.0), id="person"))
 
 
-def overlap(car: VehicleState, other: Obstacle) -> bool:
+def overlap(car: VehicleState, obstacle: Obstacle) -> bool:
     """Whether the boxes overlap by more than a micrometre."""
     slim = box_corners(car.pose, car.length - 1e-6, car.width - 1e-6)
-    return boxes_overlap(slim, box_corners(other.pose, other.length, other.width))
+    return boxes_overlap(slim, box_corners(obstacle.pose, obstacle.length, obstacle.width))
 
 
 def test_nothing_near_changes_nothing() -> None:
@@ -108,8 +109,8 @@ def test_touching_something_that_draws_away_costs_nothing() -> None:
 
 
 def test_a_standing_ego_is_not_at_fault_for_a_car_or_a_person() -> None:
-    for other in (car(2.9, 1.5, speed=5.0, heading=-math.pi / 2), person(2.2, 0.0)):
-        _, (contact,) = resolve(ego(0.0), [other])
+    for obstacle in (car(2.9, 1.5, speed=5.0, heading=-math.pi / 2), person(2.2, 0.0)):
+        _, (contact,) = resolve(ego(0.0), [obstacle])
         assert not contact.at_fault
 
 
@@ -128,10 +129,10 @@ def test_a_person_who_walks_into_the_side_was_not_run_over() -> None:
 
 
 def test_several_contacts_at_once_are_all_told_and_none_is_left_inside() -> None:
-    things = [wall(2.2, 0.0), wall(0.0, 1.3, length=20.0, width=1.0)]
-    after, contacts = resolve(ego(8.0), things)
+    walls = [wall(2.2, 0.0), wall(0.0, 1.3, length=20.0, width=1.0)]
+    after, contacts = resolve(ego(8.0), walls)
     assert len(contacts) == 2
-    assert not any(overlap(after, thing) for thing in things)
+    assert not any(overlap(after, each) for each in walls)
 
 
 @settings(max_examples=50)

@@ -1,3 +1,5 @@
+"""The ego's motion: it accelerates, brakes and turns like a compact car."""
+
 from __future__ import annotations
 
 import math
@@ -15,7 +17,7 @@ CONTROLS = st.builds(Control, st.floats(0, 1), st.floats(0, 1), st.floats(-1, 1)
 
 
 def at(speed: float, **rest: float) -> EgoState:
-    return EgoState(Pose(0, 0, 0), speed, **rest)
+    return EgoState(Pose(0, 0, 0), speed=speed, **rest)
 
 
 def run(state: EgoState, control: Control, seconds: float, config: VehicleConfig = CAR) -> EgoState:

@@ -10,32 +10,33 @@ import shapely
 
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.traffic.pedestrians import Pedestrians, find_walks, may_walk
+from caldrive.world.traffic.pedestrians import Pedestrians, may_walk
+from caldrive.world.traffic.sidewalks import find_sidewalks
 
 DT = 0.1
-FAR = VehicleState(Pose(-1e4, 0, 0), 0.0, 4.2, 1.8, "ego")  # a car where it disturbs nobody
+FAR = VehicleState(Pose(-1e4, 0, 0), id="ego")  # a car where it disturbs nobody
 Walk = list[tuple[PedestrianState, ...]]
 
 
 def walk(people: Pedestrians, seconds: float, cars: list[VehicleState] | None = None) -> Walk:
-    found = []
+    states = []
     for _ in range(round(seconds / DT)):
         people.step(DT, cars or [FAR])
-        found.append(people.states())
-    return found
+        states.append(people.states())
+    return states
 
 
 def people(roads: RoadNetwork, n: int, seed: int = 0, crossing: float = 1.0) -> Pedestrians:
     return Pedestrians(roads, n, np.random.default_rng(seed), crossing)
 
 
-def places(moments: Walk) -> np.ndarray:
-    return np.array([[(p.pose.x, p.pose.y) for p in moment] for moment in moments])
+def places(walk: Walk) -> np.ndarray:
+    return np.array([[(p.pose.x, p.pose.y) for p in people] for people in walk])
 
 
-def crossings(moments: Walk) -> int:
+def crossings(walk: Walk) -> int:
     """How often somebody stepped onto the road."""
-    on_road = np.array([[p.on_road for p in moment] for moment in moments], dtype=int)
+    on_road = np.array([[p.on_road for p in people] for people in walk], dtype=int)
     return int((np.diff(on_road, axis=0) > 0).sum())
 
 
@@ -47,7 +48,7 @@ def busy(town02: RoadNetwork) -> Walk:
 
 def test_whoever_is_on_the_roadway_is_known_to_be(busy: Walk, town02: RoadNetwork) -> None:
     at = shapely.points(places(busy[::5]).reshape(-1, 2))
-    on_road = np.array([p.on_road for moment in busy[::5] for p in moment])
+    on_road = np.array([p.on_road for people in busy[::5] for p in people])
     assert not shapely.covers(town02.roadway.buffer(-0.05), at[~on_road]).any()
     away = shapely.distance(town02.roadway, at[on_road])
     assert away.max() < 1.3
@@ -69,7 +70,7 @@ def test_people_walk_at_a_walking_pace_and_look_where_they_go(busy: Walk) -> Non
     before, after = places(busy)[:-1], places(busy)[1:]
     step = after - before
     length = np.linalg.norm(step, axis=2)
-    heading = np.array([[p.pose.heading for p in moment] for moment in busy[1:]])
+    heading = np.array([[p.pose.heading for p in people] for people in busy[1:]])
     walking = (length > 0.05) & (length < 0.3)
     along = np.cos(np.arctan2(step[..., 1], step[..., 0]) - heading)
     assert 0.7 < np.median(length[walking]) / DT < 1.8
@@ -84,15 +85,15 @@ def test_people_cross_from_one_sidewalk_to_another(town02: RoadNetwork) -> None:
 
 
 def test_crossings_lead_straight_over_the_road_from_kerb_to_kerb(town: RoadNetwork) -> None:
-    found = [crossing for loop in find_walks(town).crossings for crossing in loop]
-    assert len(found) > 200
-    lines = shapely.linestrings(np.array([(crossing.start, crossing.end) for crossing in found]))
+    ways = [way for loop in find_sidewalks(town).crossings for way in loop]
+    assert len(ways) > 200
+    lines = shapely.linestrings(np.array([(way.start, way.end) for way in ways]))
     lengths, on_road = shapely.length(lines), shapely.length(shapely.intersection(lines, town.roadway))
     assert lengths.min() > 5.0
     assert lengths.max() < 23.0
     assert on_road.min() > 3.5
     assert np.percentile(lengths - on_road, 99) < 6.0, "a sidewalk's half at each end"
-    ends = shapely.points(np.array([end for crossing in found for end in (crossing.start, crossing.end)]))
+    ends = shapely.points(np.array([end for way in ways for end in (way.start, way.end)]))
     assert shapely.distance(ends, town.roadway).min() > 1.0
 
 
@@ -133,7 +134,7 @@ def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float
 
 
 def car(speed: float, heading: float = 0.0) -> VehicleState:
-    return VehicleState(Pose(0, 0, heading), speed, 4.2, 1.8)
+    return VehicleState(Pose(0, 0, heading), speed, length=4.2, width=1.8)
 
 
 OVER_THE_LANE = (0.0, 7.0)  # m, from the kerb right of a car
@@ -189,11 +190,11 @@ def test_the_look_before_a_step_does_not_depend_on_the_compass(heading: float) -
 
 
 def test_nobody_is_run_over_on_a_street_where_a_fast_car_drives_up_and_down(town02: RoadNetwork) -> None:
-    lane = max(town02.driveable, key=lambda one: one.line.length).line
+    lane = max(town02.driveable, key=lambda lane: lane.line.length).line
     group, closest = people(town02, 80, 4, crossing=10.0), math.inf
     for i in range(300):
         pose = lane.pose_at((i * 1.2) % lane.length)
-        ego = VehicleState(pose, 12.0, 4.2, 1.8)
+        ego = VehicleState(pose, 12.0, length=4.2, width=1.8)
         before = group.on_road.copy()
         group.step(DT, [ego])
         c, s = math.cos(pose.heading), math.sin(pose.heading)

@@ -18,8 +18,8 @@ from caldrive.world.traffic.traffic_lights import (
     SHORTEST_CLEARING,
     SHORTEST_GREEN,
     YELLOW,
-    Lights,
     Phase,
+    TrafficLights,
     next_phase,
 )
 
@@ -32,18 +32,18 @@ demands = st.lists(demand, min_size=1, max_size=8)
 
 def run(demands: list[tuple[list[bool], bool, float]], first: int = 0) -> list[tuple[float, Phase, list[bool]]]:
     """The phases of a junction, step by step: time, phase, who waits."""
-    phase, time, found = Phase(first, GREEN, 0.0), 0.0, []
+    phase, time, phases = Phase(first, GREEN, 0.0), 0.0, []
     for waiting, occupied, seconds in demands:
         for _ in range(round(seconds / DT)):
             time = round(time + DT, 6)
             phase = next_phase(phase, time, waiting, occupied)
-            found.append((time, phase, waiting))
-    return found
+            phases.append((time, phase, waiting))
+    return phases
 
 
 def spells(phases: list[tuple[float, Phase, list[bool]]]) -> list[tuple[Phase, float]]:
     """Each phase with the time it lasted in s, the last and unfinished one left out."""
-    begins = [next(group) for _, group in groupby(phases, key=lambda one: one[1])]
+    begins = [next(group) for _, group in groupby(phases, key=lambda row: row[1])]
     return [(phase, after[1].since - phase.since) for (_, phase, _), after in pairwise(begins)]
 
 
@@ -119,57 +119,59 @@ def waiting_car(post: LightPost, roads: RoadNetwork, before: float = 4.0, turn: 
     return VehicleState(moved(lane.pose_at(lane.length - before), turn=turn))
 
 
-def shown(lights: Lights, post: LightPost) -> LightState:
-    return next(light.state for light in lights.shown() if light.id == post.id)
+def state_of(lights: TrafficLights, post: LightPost) -> LightState:
+    return next(light.state for light in lights.states() if light.id == post.id)
 
 
-def drive(lights: Lights, cars: list[VehicleState], seconds: float) -> list[tuple[LightState, ...]]:
-    found = []
+def drive(lights: TrafficLights, cars: list[VehicleState], seconds: float) -> list[tuple[LightState, ...]]:
+    history = []
     for i in range(round(seconds / DT)):
         lights.step((i + 1) * DT, cars)
-        found.append(tuple(light.state for light in lights.shown()))
-    return found
+        history.append(tuple(light.state for light in lights.states()))
+    return history
 
 
 @pytest.mark.parametrize("index", range(6))
 def test_a_car_at_a_stop_line_turns_its_light_green(index: int, town02: RoadNetwork) -> None:
-    lights, post = Lights(town02, np.random.default_rng(1)), town02.posts[index]
+    lights, post = TrafficLights(town02, np.random.default_rng(1)), town02.posts[index]
     drive(lights, [waiting_car(post, town02)], 15)
-    assert shown(lights, post) is GREEN
+    assert state_of(lights, post) is GREEN
 
 
 @pytest.mark.parametrize(("before", "turn"), [(40.0, 0.0), (4.0, 3.14)], ids=["far away", "driving away"])
 def test_a_car_that_does_not_wait_changes_nothing(before: float, turn: float, town01: RoadNetwork) -> None:
     long = next(post for post in town01.posts if town01.lanes[post.lane].line.length > before)
-    lights = Lights(town01, np.random.default_rng(1))
-    start = [light.state for light in lights.shown() if light.id.startswith(f"{long.light}/")]
+    lights = TrafficLights(town01, np.random.default_rng(1))
+    start = [light.state for light in lights.states() if light.id.startswith(f"{long.light}/")]
     drive(lights, [waiting_car(long, town01, before, turn)], 15)
-    assert [light.state for light in lights.shown() if light.id.startswith(f"{long.light}/")] == start
+    assert [light.state for light in lights.states() if light.id.startswith(f"{long.light}/")] == start
 
 
 def test_no_junction_ever_shows_two_approaches_anything_but_red(town02: RoadNetwork) -> None:
-    lights = Lights(town02, np.random.default_rng(1))
+    lights = TrafficLights(town02, np.random.default_rng(1))
     cars = [waiting_car(post, town02) for post in town02.posts]
-    names = [light.id.split("/")[0] for light in lights.shown()]
+    names = [light.id.split("/")[0] for light in lights.states()]
     for states in drive(lights, cars, 60):
         going = [name for name, state in zip(names, states, strict=True) if state is not RED]
         assert len(going) == len(set(going))
 
 
 def test_equal_seeds_show_equal_lights(town01: RoadNetwork) -> None:
-    first, again, other = (Lights(town01, np.random.default_rng(seed)).shown() for seed in (1, 1, 2))
+    first, again, other = (TrafficLights(town01, np.random.default_rng(seed)).states() for seed in (1, 1, 2))
     assert first == again
     assert first != other
 
 
 def test_every_post_is_shown_with_its_place_and_stop_line(town01: RoadNetwork) -> None:
-    found = {light.id: (light.pose, light.stop_line) for light in Lights(town01, np.random.default_rng(0)).shown()}
-    assert found == {post.id: (post.pose, post.stop_line) for post in town01.posts}
+    lights = TrafficLights(town01, np.random.default_rng(0)).states()
+    assert {light.id: (light.pose, light.stop_line) for light in lights} == {
+        post.id: (post.pose, post.stop_line) for post in town01.posts
+    }
 
 
 def test_a_town_without_lights_has_nothing_to_show() -> None:
     from types import SimpleNamespace
 
-    lights = Lights(SimpleNamespace(posts=()), np.random.default_rng(0))  # type: ignore[arg-type]
+    lights = TrafficLights(SimpleNamespace(posts=()), np.random.default_rng(0))  # type: ignore[arg-type]
     lights.step(0.1, [])
-    assert lights.shown() == ()
+    assert lights.states() == ()

@@ -14,27 +14,31 @@ from shapely import LineString
 from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, VehicleState
 from caldrive.geometry import box_corners, boxes_overlap, moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
-from caldrive.world.traffic.traffic_lights import Lights
+from caldrive.world.traffic.traffic_lights import TrafficLights
 from caldrive.world.traffic.vehicles import Traffic, in_sight, room, stop_sumo
 
 DT = 0.1
 Cars = tuple[VehicleState, ...]
-AWAY = VehicleState(Pose(-400.0, -400.0, 0.0), 0.0, 4.2, 1.8, "ego")  # an ego that is in nobody's way
+AWAY = VehicleState(
+    Pose(-400.0, -400.0, 0.0), speed=0.0, length=4.2, width=1.8, id="ego"
+)  # an ego that is in nobody's way
 
 
 @dataclass(frozen=True)
-class Moment:
+class Snapshot:
+    """The cars and the lights at a time in s."""
+
     time: float
     cars: Cars
     lights: tuple[TrafficLight, ...]
 
 
 def ego_on(lane: Lane, s: float, speed: float = 0.0) -> VehicleState:
-    return VehicleState(lane.line.pose_at(s), speed, 4.2, 1.8, "ego")
+    return VehicleState(lane.line.pose_at(s), speed, length=4.2, width=1.8, id="ego")
 
 
 def longest_lane(roads: RoadNetwork) -> Lane:
-    return max(roads.driveable, key=lambda one: one.line.length)
+    return max(roads.driveable, key=lambda lane: lane.line.length)
 
 
 def drive(
@@ -44,17 +48,18 @@ def drive(
     seed: int = 1,
     ego: VehicleState = AWAY,
     people: Callable[[Cars], Sequence[PedestrianState]] = lambda _: (),
-) -> list[Moment]:
+) -> list[Snapshot]:
     """Traffic for some seconds, with an ego that does not move."""
-    lights = Lights(roads, np.random.default_rng(seed))
-    traffic = Traffic(roads, n, seed, DT, ego_on(longest_lane(roads), 10.0) if ego is AWAY else ego, lights)
-    found = []
+    lights = TrafficLights(roads, np.random.default_rng(seed))
+    start = ego_on(longest_lane(roads), 10.0) if ego is AWAY else ego
+    traffic = Traffic(roads, n=n, seed=seed, dt=DT, ego=start, lights=lights)
+    snapshots = []
     for i in range(round(seconds / DT)):
         time = round((i + 1) * DT, 6)
         lights.step(time, (ego, *traffic.cars))
         traffic.step(time, ego, people(traffic.cars))
-        found.append(Moment(time, traffic.cars, lights.shown()))
-    return found
+        snapshots.append(Snapshot(time, traffic.cars, lights.states()))
+    return snapshots
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -64,23 +69,24 @@ def _end_of_sumo() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def usual(town02: RoadNetwork) -> list[Moment]:
+def usual(town02: RoadNetwork) -> list[Snapshot]:
     """A minute of the protocol's 15 cars."""
     return drive(town02, 15, 60)
 
 
 @pytest.fixture(scope="module")
-def dense(town01: RoadNetwork) -> list[Moment]:
+def dense(town01: RoadNetwork) -> list[Snapshot]:
     """Two minutes of 100 cars."""
     return drive(town01, 100, 120)
 
 
-def paths(moments: list[Moment]) -> dict[str, list[VehicleState]]:
-    found: dict[str, list[VehicleState]] = {}
-    for moment in moments:
-        for car in moment.cars:
-            found.setdefault(car.id, []).append(car)
-    return found
+def paths(snapshots: list[Snapshot]) -> dict[str, list[VehicleState]]:
+    """The states of each car, one after the other, by its id."""
+    by_car: dict[str, list[VehicleState]] = {}
+    for snapshot in snapshots:
+        for car in snapshot.cars:
+            by_car.setdefault(car.id, []).append(car)
+    return by_car
 
 
 def overlaps(cars: Cars) -> list[tuple[str, str]]:
@@ -91,25 +97,25 @@ def overlaps(cars: Cars) -> list[tuple[str, str]]:
     return [(cars[i].id, cars[j].id) for i, j in near if boxes_overlap(corners[i], corners[j])]
 
 
-def test_all_cars_are_there_from_the_start_and_stay(usual: list[Moment], dense: list[Moment]) -> None:
-    assert {len(moment.cars) for moment in usual} == {15}
-    assert min(len(moment.cars) for moment in dense) >= 97
+def test_all_cars_are_there_from_the_start_and_stay(usual: list[Snapshot], dense: list[Snapshot]) -> None:
+    assert {len(snapshot.cars) for snapshot in usual} == {15}
+    assert min(len(snapshot.cars) for snapshot in dense) >= 97
     assert {car.id for car in usual[0].cars} == {f"car{i}" for i in range(15)}
 
 
-def test_the_ego_is_none_of_the_other_cars(usual: list[Moment]) -> None:
+def test_the_ego_is_none_of_the_other_cars(usual: list[Snapshot]) -> None:
     assert all(car.id != "ego" for car in usual[-1].cars)
 
 
-def test_cars_follow_the_centre_lines_of_their_lanes(usual: list[Moment], town02: RoadNetwork) -> None:
-    for moment in usual[::20]:
-        for car in moment.cars:
+def test_cars_follow_the_centre_lines_of_their_lanes(usual: list[Snapshot], town02: RoadNetwork) -> None:
+    for snapshot in usual[::20]:
+        for car in snapshot.cars:
             hits = [lane.line.project(car.pose.x, car.pose.y) for lane in town02.lanes.values()]
             off = [abs(hit.left) for hit in hits if abs(wrap_angle(hit.heading - car.pose.heading)) < 0.6]
             assert min(off) < 0.8
 
 
-def test_a_car_moves_along_its_heading_at_its_speed(usual: list[Moment]) -> None:
+def test_a_car_moves_along_its_heading_at_its_speed(usual: list[Snapshot]) -> None:
     for path in paths(usual).values():
         for before, after in pairwise(path):
             ahead, left = to_local(before.pose, np.array([after.pose.x, after.pose.y]))
@@ -117,7 +123,7 @@ def test_a_car_moves_along_its_heading_at_its_speed(usual: list[Moment]) -> None
             assert abs(left) < 0.5
 
 
-def test_cars_keep_to_the_limit_and_brake_and_accelerate_like_cars(usual: list[Moment], town02: RoadNetwork) -> None:
+def test_cars_keep_to_the_limit_and_brake_and_accelerate_like_cars(usual: list[Snapshot], town02: RoadNetwork) -> None:
     fastest = max(lane.limit for lane in town02.driveable) / 3.6
     for path in paths(usual).values():
         speeds = np.array([car.speed for car in path])
@@ -127,16 +133,16 @@ def test_cars_keep_to_the_limit_and_brake_and_accelerate_like_cars(usual: list[M
 
 @pytest.mark.parametrize("recording", ["usual", "dense"])
 def test_no_two_cars_overlap(recording: str, request: pytest.FixtureRequest) -> None:
-    moments: list[Moment] = request.getfixturevalue(recording)
-    assert [pair for moment in moments[::5] for pair in overlaps(moment.cars)] == []
+    snapshots: list[Snapshot] = request.getfixturevalue(recording)
+    assert [pair for snapshot in snapshots[::5] for pair in overlaps(snapshot.cars)] == []
 
 
 @pytest.mark.parametrize("recording", ["usual", "dense"])
 def test_cars_stop_at_red(recording: str, request: pytest.FixtureRequest) -> None:
-    moments: list[Moment] = request.getfixturevalue(recording)
+    snapshots: list[Snapshot] = request.getfixturevalue(recording)
     crossed = dict.fromkeys(LightState, 0)
-    lines = np.array([light.stop_line for light in moments[0].lights])
-    for before, after in pairwise(moments):
+    lines = np.array([light.stop_line for light in snapshots[0].lights])
+    for before, after in pairwise(snapshots):
         places = {car.id: moved(car.pose, car.length / 2) for car in before.cars}
         for car in after.cars:
             a, b = places.get(car.id), moved(car.pose, car.length / 2)
@@ -150,13 +156,13 @@ def test_cars_stop_at_red(recording: str, request: pytest.FixtureRequest) -> Non
     assert crossed[LightState.GREEN] > 5
 
 
-def test_nobody_stands_for_ever_where_the_town_is_full(dense: list[Moment]) -> None:
+def test_nobody_stands_for_ever_where_the_town_is_full(dense: list[Snapshot]) -> None:
     moving = {name: [car.speed > 0.5 for car in path] for name, path in paths(dense).items()}
     assert all(any(when[-900:]) for when in moving.values()), "who stood for 90 s is stuck"
     assert np.mean([when[-1] for when in moving.values()]) > 0.3
 
 
-def test_cars_drive_through_the_whole_town(dense: list[Moment], town01: RoadNetwork) -> None:
+def test_cars_drive_through_the_whole_town(dense: list[Snapshot], town01: RoadNetwork) -> None:
     ways = {
         name: sum(math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in pairwise(path))
         for name, path in paths(dense).items()
@@ -169,7 +175,7 @@ def test_cars_drive_through_the_whole_town(dense: list[Moment], town01: RoadNetw
     assert np.ptp(at[:, 1]) > 0.8 * (y1 - y0)
 
 
-def test_equal_seeds_give_equal_traffic_and_others_do_not(town02: RoadNetwork, usual: list[Moment]) -> None:
+def test_equal_seeds_give_equal_traffic_and_others_do_not(town02: RoadNetwork, usual: list[Snapshot]) -> None:
     again, other = (drive(town02, 15, 15, seed)[-1].cars for seed in (1, 2))
     assert again == usual[149].cars
     assert {car.pose for car in other}.isdisjoint(car.pose for car in again)
@@ -195,9 +201,9 @@ def test_nobody_starts_on_top_of_the_ego(town02: RoadNetwork) -> None:
 def test_cars_queue_behind_a_standing_ego(town02: RoadNetwork) -> None:
     lane = longest_lane(town02)
     ego = ego_on(lane, 60.0)
-    moments = drive(town02, 40, 45, ego=ego)
-    assert not any(overlaps((ego, *moment.cars)) for moment in moments)
-    places = [to_local(ego.pose, np.array([c.pose.x, c.pose.y])) for c in moments[-1].cars if c.speed < 0.1]
+    snapshots = drive(town02, 40, 45, ego=ego)
+    assert not any(overlaps((ego, *snapshot.cars)) for snapshot in snapshots)
+    places = [to_local(ego.pose, np.array([c.pose.x, c.pose.y])) for c in snapshots[-1].cars if c.speed < 0.1]
     queue = sorted(-x for x, y in places if -25 < x < 0 and abs(y) < 1.0)
     assert queue
     assert 4.2 < queue[0] < 9.0
@@ -222,9 +228,9 @@ def test_a_car_stops_for_somebody_on_the_road_and_then_drives_on(town02: RoadNet
         return [met[0][1]] if 0 < len(stood) <= 100 else ()
 
     stood: list[tuple[str, PedestrianState]] = []
-    moments = drive(town02, 30, 60, people=step_out)
+    snapshots = drive(town02, 30, 60, people=step_out)
     name, person = met[0]
-    path = paths(moments)[name]
+    path = paths(snapshots)[name]
     ahead = [float(to_local(car.pose, np.array([person.pose.x, person.pose.y]))[0]) - car.length / 2 for car in path]
     begin = next(i for i, car in enumerate(path) if abs(ahead[i] - 18.0) < 2.0 and car.speed > 5)
     assert min(ahead[begin : begin + 95]) > 0.5
@@ -232,7 +238,7 @@ def test_a_car_stops_for_somebody_on_the_road_and_then_drives_on(town02: RoadNet
     assert max(car.speed for car in path[begin + 110 : begin + 200]) > 2.0
 
 
-def test_nobody_brakes_for_people_on_the_sidewalk(town02: RoadNetwork, usual: list[Moment]) -> None:
+def test_nobody_brakes_for_people_on_the_sidewalk(town02: RoadNetwork, usual: list[Snapshot]) -> None:
     onlookers = [someone_before(car, 6.0) for car in usual[0].cars]
     calm = [PedestrianState(p.pose, 0.0, on_road=False, id=p.id) for p in onlookers]
     assert drive(town02, 15, 10, people=lambda _: calm)[-1].cars == usual[99].cars
@@ -242,5 +248,5 @@ def test_nobody_brakes_for_people_on_the_sidewalk(town02: RoadNetwork, usual: li
     ("ahead", "left", "seen"), [(60, 0, True), (80, 0, False), (-20, 0, True), (-30, 0, False), (10, 40, False)]
 )
 def test_stuck_cars_are_moved_only_where_the_ego_does_not_look(ahead: float, left: float, seen: bool) -> None:
-    ego = VehicleState(Pose(5, 5, math.pi / 2), 0.0, 4.2, 1.8, "ego")
+    ego = VehicleState(Pose(5, 5, math.pi / 2), id="ego")
     assert in_sight(ego, (5 - left, 5 + ahead)) is seen

@@ -38,6 +38,10 @@ A1, A2, A3 = (7.4, 14.0, -5.8, -0.8), (0.0, 8.2, -2.0, 2.0), (0.0, 50.0, -1.6, 1
 CM = 0.01
 
 
+def ego_at(pose: Pose, speed: float = 5.0) -> VehicleState:
+    return VehicleState(pose, speed, length=CAR.length, width=CAR.width, id="ego")
+
+
 @dataclass(frozen=True)
 class Scene:
     """Things by their places ahead of and left of the front axle of an ego at `pose`."""
@@ -52,13 +56,19 @@ class Scene:
 
     @property
     def label(self) -> Affordances:
-        ego = VehicleState(self.pose, self.speed, CAR.length, CAR.width, "ego")
-        line = Polyline(self.route)
-        return label(ego, CAR.front_axle, line, None, self.vehicles, self.pedestrians, self.lights, self.signs)
+        return label(
+            ego_at(self.pose, self.speed),
+            CAR.front_axle,
+            Polyline(self.route),
+            vehicles=self.vehicles,
+            pedestrians=self.pedestrians,
+            lights=self.lights,
+            signs=self.signs,
+        )
 
 
 def car(x: float, y: float, heading: float = 0.0, length: float = 4.5) -> VehicleState:
-    return VehicleState(Pose(x, y, heading), 0.0, length, 1.8)
+    return VehicleState(Pose(x, y, heading), speed=0.0, length=length, width=1.8)
 
 
 def person(x: float, y: float) -> PedestrianState:
@@ -99,12 +109,13 @@ def test_a_car_is_ahead_when_its_centre_is_within_a3(x: float, y: float, inside:
 
 
 def test_on_an_empty_road_every_label_is_its_default() -> None:
-    assert Scene().label == Affordances(0.0, 0.0, None, 50.0, 0.0, 0.0)
+    assert Scene().label == Affordances()
+    assert Affordances().vehicle_distance == 50.0
 
 
 def test_people_are_no_cars_ahead_and_cars_no_lights() -> None:
-    found = Scene(pedestrians=[person(20, 0)], vehicles=[car(10, -3)]).label
-    assert found == Affordances()
+    true = Scene(pedestrians=[person(20, 0)], vehicles=[car(10, -3)]).label
+    assert true == Affordances()
 
 
 @pytest.mark.parametrize(("state", "red"), [(LightState.RED, 1), (LightState.YELLOW, 1), (LightState.GREEN, 0)])
@@ -133,10 +144,10 @@ def test_who_brakes_for_a_light_below_15_kmh_stands_with_the_light_in_the_area(s
     state, controller = EgoState(IN_LANE, speed), CALController(DEFAULT)
     at = min(light_area(speed).near + 0.2 * speed + further, 14.0 - CM)  # seen for long enough to react
     for _ in range(30):
-        ego = VehicleState(state.pose, state.speed, CAR.length, CAR.width, "ego")
-        found = label(ego, CAR.front_axle, Polyline(STRAIGHT), lights=[light(at, -3)])
-        assert found.red_light == 1.0
-        late = Control() if state.pose == IN_LANE else controller.step(found, state.speed, Command.STRAIGHT).control
+        ego = ego_at(state.pose, state.speed)
+        true = label(ego, CAR.front_axle, Polyline(STRAIGHT), lights=[light(at, -3)])
+        assert true.red_light == 1.0
+        late = Control() if state.pose == IN_LANE else controller.step(true, state.speed, Command.STRAIGHT).control
         state = advance(state, late, 0.1, CAR)
 
 
@@ -151,8 +162,8 @@ def test_the_nearest_sign_wins() -> None:
 
 @pytest.mark.parametrize(("gap", "length"), [(0.5, 4.2), (10.0, 4.9), (40.0, 4.2)])
 def test_the_distance_runs_from_bumper_to_bumper(gap: float, length: float) -> None:
-    found = Scene(vehicles=[car(BUMPER + gap + length / 2, 0.0, length=length)]).label
-    assert found.vehicle_distance == pytest.approx(gap)
+    true = Scene(vehicles=[car(BUMPER + gap + length / 2, 0.0, length=length)]).label
+    assert true.vehicle_distance == pytest.approx(gap)
 
 
 def test_the_distance_to_a_slanted_car_runs_to_its_closest_corner() -> None:
@@ -160,8 +171,8 @@ def test_the_distance_to_a_slanted_car_runs_to_its_closest_corner() -> None:
     reach = 4.5 / 2 * math.cos(slant) + 1.8 / 2 * math.sin(slant)
     corner = 4.5 / 2 * math.sin(slant) - 1.8 / 2 * math.cos(slant)
     assert abs(corner) < CAR.width / 2, "the corner lies straight before the bumper"
-    found = Scene(vehicles=[car(20.0, 0.0, slant)]).label
-    assert found.vehicle_distance == pytest.approx(20.0 - reach - BUMPER)
+    true = Scene(vehicles=[car(20.0, 0.0, slant)]).label
+    assert true.vehicle_distance == pytest.approx(20.0 - reach - BUMPER)
 
 
 def test_the_closest_car_ahead_counts_and_touching_boxes_are_0_apart() -> None:
@@ -182,8 +193,8 @@ def test_a_car_turned_left_has_a_negative_angle_and_turned_right_a_positive_one(
 
 
 def test_position_is_that_of_the_front_axle_not_of_the_centre() -> None:
-    found = Scene(Pose(0, 0, 0.3)).label
-    assert found.center_distance == pytest.approx(-CAR.front_axle * math.sin(0.3))
+    true = Scene(Pose(0, 0, 0.3)).label
+    assert true.center_distance == pytest.approx(-CAR.front_axle * math.sin(0.3))
 
 
 @pytest.mark.parametrize(("left", "wanted"), [(3.0, -2.0), (-3.0, 2.0), (1.99, -1.99)])
@@ -196,9 +207,9 @@ def test_a_car_that_goes_straight_into_a_bend_must_steer_to_its_inside(side: int
     radius = 15.0
     angles = np.linspace(0, math.pi / 2, 400)
     bend = np.stack((radius * np.sin(angles), side * radius * (1 - np.cos(angles))), axis=1)
-    found = Scene(Pose(4.0 - CAR.front_axle, 0, 0), bend).label
-    assert found.relative_angle == pytest.approx(side * math.atan(4.0 / radius), abs=0.01)
-    assert found.center_distance == pytest.approx(side * (math.hypot(4.0, radius) - radius), abs=0.01)
+    true = Scene(Pose(4.0 - CAR.front_axle, 0, 0), bend).label
+    assert true.relative_angle == pytest.approx(side * math.atan(4.0 / radius), abs=0.01)
+    assert true.center_distance == pytest.approx(side * (math.hypot(4.0, radius) - radius), abs=0.01)
 
 
 @pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
@@ -207,13 +218,13 @@ def test_a_car_on_a_bend_along_its_tangent_is_on_the_line(side: int) -> None:
     angles = np.linspace(0, math.pi / 2, 400)
     bend = np.stack((radius * np.sin(angles), side * radius * (1 - np.cos(angles))), axis=1)
     axle = Pose(radius * math.sin(along), side * radius * (1 - math.cos(along)), side * along)
-    found = Scene(moved(axle, forward=-CAR.front_axle), bend).label
-    assert (found.relative_angle, found.center_distance) == pytest.approx((0.0, 0.0), abs=0.01)
+    true = Scene(moved(axle, forward=-CAR.front_axle), bend).label
+    assert (true.relative_angle, true.center_distance) == pytest.approx((0.0, 0.0), abs=0.01)
 
 
 def test_where_the_route_crosses_itself_the_known_progress_decides() -> None:
     loop = np.array([(-20, 0), (40, 0), (40, 40), (0, 40), (0, -40)], dtype=float)
-    ego = VehicleState(Pose(-CAR.front_axle, 0.3, 0.0), 5.0, CAR.length, CAR.width)
+    ego = ego_at(Pose(-CAR.front_axle, 0.3, 0.0))
     assert label(ego, CAR.front_axle, Polyline(loop), near=20.0).center_distance == pytest.approx(-0.3)
     second = label(ego, CAR.front_axle, Polyline(loop), near=179.7)
     assert second.relative_angle == pytest.approx(-math.pi / 2, abs=0.02)
@@ -235,9 +246,9 @@ def test_in_a_turn_a_car_that_waits_in_the_opposite_lane_is_not_in_the_way() -> 
 
 def test_in_a_turn_a_car_on_the_route_is_in_the_way() -> None:
     axle = Pose(8 * math.sin(0.8), 8 * (1 - math.cos(0.8)), 0.8)
-    found = Scene(moved(axle, forward=-CAR.front_axle), left_turn(), vehicles=[car(7.9, 6.0, 1.4)]).label
-    assert found.hazard_stop == 1.0
-    assert 0.5 < found.vehicle_distance < 1.5
+    true = Scene(moved(axle, forward=-CAR.front_axle), left_turn(), vehicles=[car(7.9, 6.0, 1.4)]).label
+    assert true.hazard_stop == 1.0
+    assert 0.5 < true.vehicle_distance < 1.5
 
 
 def test_on_a_straight_road_a_car_that_reaches_into_the_lane_is_in_the_way() -> None:
@@ -274,20 +285,20 @@ def test_labels_do_not_change_when_everything_is_moved_and_turned_alike(
     # Places are rounded, since a thing on the very border of an area may fall to either side.
     round_ = [[Pose(round(x) + 0.13, round(y) + 0.17, h) for x, y, h in some] for some in (cars, people, posts)]
     here = Scene(
-        Pose(-CAR.front_axle, round(left, 1) + 0.01, 0.0),
-        np.array([(-20.0, 0.0), (30.0, 0.0), (60.0, 25.0)]),
-        [VehicleState(pose) for pose in round_[0]],
-        [PedestrianState(pose) for pose in round_[1]],
-        [light(pose.x, pose.y, heading=turn) for pose in round_[2]],
-        [sign(pose.x, pose.y, heading=turn) for pose in round_[2]],
+        pose=Pose(-CAR.front_axle, round(left, 1) + 0.01, 0.0),
+        route=np.array([(-20.0, 0.0), (30.0, 0.0), (60.0, 25.0)]),
+        vehicles=[VehicleState(pose) for pose in round_[0]],
+        pedestrians=[PedestrianState(pose) for pose in round_[1]],
+        lights=[light(pose.x, pose.y, heading=turn) for pose in round_[2]],
+        signs=[sign(pose.x, pose.y, heading=turn) for pose in round_[2]],
     )
     there = Scene(
-        moved_by(frame, here.pose),
-        to_world(frame, here.route),
-        [replace(one, pose=moved_by(frame, one.pose)) for one in here.vehicles],
-        [replace(one, pose=moved_by(frame, one.pose)) for one in here.pedestrians],
-        [replace(one, pose=moved_by(frame, one.pose)) for one in here.lights],
-        [replace(one, pose=moved_by(frame, one.pose)) for one in here.signs],
+        pose=moved_by(frame, here.pose),
+        route=to_world(frame, here.route),
+        vehicles=[replace(car, pose=moved_by(frame, car.pose)) for car in here.vehicles],
+        pedestrians=[replace(person, pose=moved_by(frame, person.pose)) for person in here.pedestrians],
+        lights=[replace(light, pose=moved_by(frame, light.pose)) for light in here.lights],
+        signs=[replace(sign, pose=moved_by(frame, sign.pose)) for sign in here.signs],
     )
     a, b = here.label, there.label
     assert (a.hazard_stop, a.red_light, a.speed_sign) == (b.hazard_stop, b.red_light, b.speed_sign)

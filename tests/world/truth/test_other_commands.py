@@ -29,9 +29,9 @@ def route_through(command: Command, seed: int = 0, away: float = 30.0) -> Route:
 @pytest.mark.parametrize("seed", range(4))
 def test_every_junction_of_the_town_has_one_other_way(command: Command, seed: int) -> None:
     route = route_through(command, seed)
-    found = forks(TOWN, route)
-    assert len(found) == len(route.turns)  # all junctions are T-junctions, and no street ends
-    for fork, turn in zip(found, route.turns, strict=True):
+    others = forks(TOWN, route)
+    assert len(others) == len(route.turns)  # all junctions are T-junctions, and no street ends
+    for fork, turn in zip(others, route.turns, strict=True):
         assert fork.command is not turn.command
         assert fork.end == turn.end
         assert turn.start - 20.0 <= fork.start <= turn.start
@@ -56,12 +56,12 @@ def test_before_the_junction_both_ways_are_one(command: Command) -> None:
 def test_inside_the_junction_another_command_asks_for_its_way(taken: Command, asked: Command, sign: int) -> None:
     route = next(r for r in (route_through(taken, seed) for seed in range(40)) if forks(TOWN, r)[0].command is asked)
     turn, ways = route.turns[0], forks(TOWN, route)
-    seen = []
+    others = []
     for s in np.arange(turn.start, turn.end, 0.5):
-        seen += alternatives(route.line.pose_at(float(s)), ways, float(s))
-    assert {one.command for one in seen} == {asked}
-    angles = [sign * one.relative_angle for one in seen]
-    distances = [sign * one.center_distance for one in seen]
+        others += alternatives(route.line.pose_at(float(s)), ways, float(s))
+    assert {other.command for other in others} == {asked}
+    angles = [sign * other.relative_angle for other in others]
+    distances = [sign * other.center_distance for other in others]
     assert max(angles) > 0.4
     assert min(angles) > -0.05
     assert distances == sorted(distances)  # the ways part and do not meet again

@@ -15,20 +15,9 @@ _TYPES = """<types>
   {closed}
 </types>"""
 _CLOSED = (
-    "shoulder",
-    "border",
-    "stop",
-    "none",
-    "restricted",
-    "parking",
-    "median",
-    "curb",
-    "biking",
-    "special1",
-    "rail",
+    "shoulder", "border", "stop", "none", "restricted", "parking", "median", "curb", "biking", "special1", "rail",
     "tram",
-)
-
+)  # fmt: skip
 _COMMON = [
     "--no-turnarounds", "--junctions.internal-link-detail=16", "--junctions.corner-detail=8", "--xml-validation=never",
     "--no-warnings", "--precision=3", "--junctions.limit-turn-speed=4", "--check-lane-foes.all=false",
@@ -41,22 +30,25 @@ def netconvert_binary() -> Path:
         import sumo
     except ImportError:
         raise RuntimeError(
-            "found no netconvert, which reads OpenDRIVE maps: type pip install 'caldrive[opendrive]'"
+            "found no netconvert, wanted it to read an OpenDRIVE map: type pip install 'caldrive[opendrive]'"
         ) from None
     return Path(sumo.SUMO_HOME) / "bin" / "netconvert"
 
 
 def run_netconvert(arguments: list[str], target: Path) -> None:
-    """Runs netconvert and puts its network at target, whole or not at all."""
+    """Runs netconvert and puts its network at target, whole or not at all.
+
+    Raises RuntimeError where it is not installed, CalledProcessError where it fails.
+    """
     binary = netconvert_binary()
     environment = {**os.environ, "SUMO_HOME": str(binary.parent.parent)}
     with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-        made = Path(folder) / "net.xml"
-        command = [str(binary), *arguments, *_COMMON, f"--output-file={made}"]
+        network = Path(folder) / "net.xml"
+        command = [str(binary), *arguments, *_COMMON, f"--output-file={network}"]
         subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
         # The header names the time and the command line: without it the same plan gives the same bytes.
-        made.write_text(re.sub(r"<!--.*?-->\s*", "", made.read_text(), flags=re.DOTALL))
-        os.replace(made, target)
+        network.write_text(re.sub(r"<!--.*?-->\s*", "", network.read_text(), flags=re.DOTALL))
+        os.replace(network, target)
 
 
 def convert_opendrive(source: Path, target: Path) -> None:
@@ -74,5 +66,6 @@ def convert_opendrive(source: Path, target: Path) -> None:
         except subprocess.CalledProcessError as error:
             reason = next((line for line in error.stderr.splitlines() if "rror" in line), "no reason given")
             raise ValueError(
-                f"{source} is no OpenDRIVE map that netconvert can read ({reason}): give another .xodr file"
+                f"found that netconvert cannot read {source} ({reason}), wanted an OpenDRIVE map: "
+                "give another .xodr file"
             ) from error

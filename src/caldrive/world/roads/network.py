@@ -1,69 +1,82 @@
 """The road network: lanes with their centre lines (inside junctions too), turns, stop lines, light posts and signs.
 
-Always read from a SUMO network; where it comes from (a shipped town, an OpenDRIVE map) is the matter of `towns`.
+`sumo_reader` makes it from a SUMO network; where that comes from (a shipped town, an OpenDRIVE map) is the matter of
+`towns`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import shapely
-import sumolib
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Command, Pose, Sign
-from caldrive.geometry import Polyline, moved, to_local, wrap_angle
+from caldrive.geometry import Polyline
 
-SIDEWALK_WIDTH = 3.0
+SIDEWALK_WIDTH = 3.0  # m
 POST_BESIDE_LANE = 1.1  # m from the kerb to the foot of a post
-_TURNS = {"l": Command.LEFT, "L": Command.LEFT, "r": Command.RIGHT, "R": Command.RIGHT, "s": Command.STRAIGHT}
+ON_LANE = 4.0  # m from a lane's middle within which a place is on it
+StopLine = tuple[tuple[float, float], tuple[float, float]]  # its ends, left end first, m
 
 
 @dataclass(frozen=True)
 class Lane:
-    """A driving lane. limit in km/h; successors are lane ids; internal lanes lie inside junctions.
-
-    turn: the command that leads along this lane, for internal lanes of true junctions. light: (traffic light id, link).
-    """
+    """A driving lane."""
 
     id: str
     line: Polyline
+    """Its middle, in the direction of travel."""
     width: float
+    """m."""
     limit: float
+    """km/h."""
     internal: bool = False
+    """Whether it lies inside a junction."""
     successors: tuple[str, ...] = ()
+    """Ids of the lanes that it leads to."""
     turn: Command | None = None
+    """The command that leads along it, for internal lanes of true junctions."""
     light: tuple[str, int] | None = None
+    """The traffic light that it obeys: its id, and the link of it."""
 
 
 @dataclass(frozen=True)
 class LightPost:
-    """A post with a light for one approach: foot pose (heading of the traffic it faces), stop line, SUMO links."""
+    """A post with a light for one approach of a junction."""
 
     light: str
+    """The junction's traffic light."""
     lane: str
+    """The lane that ends before it."""
     links: tuple[int, ...]
+    """The light's links (SUMO's) that begin on the lane."""
     pose: Pose
-    stop_line: tuple[tuple[float, float], tuple[float, float]]
+    """Of its foot; the heading is that of the traffic that it faces."""
+    stop_line: StopLine
+    """Across the lane's end."""
 
     @cached_property
     def id(self) -> str:
+        """Of the light and the lane."""
         return f"{self.light}/{self.lane}"
 
 
 @dataclass(frozen=True, eq=False)
 class RoadNetwork:
-    """A town's roads. network: the SUMO file. style: which look the camera gives it."""
+    """A town's roads."""
 
     name: str
     network: Path
-    style: str
+    """The SUMO file."""
+    appearance: str
+    """The town of `TOWN_APPEARANCES` that it looks like."""
     lanes: dict[str, Lane]
+    """By their ids."""
     posts: tuple[LightPost, ...]
     signs: tuple[Sign, ...]
 
@@ -96,19 +109,21 @@ class RoadNetwork:
 
     @cached_property
     def _boxes(self) -> NDArray[np.float64]:
+        """Bounding boxes (N, 4) of the driveable lanes: x_min, y_min, x_max, y_max in m."""
         lines = [lane.line.points for lane in self.driveable]
         return np.array([(*line.min(0), *line.max(0)) for line in lines])
 
     def lane_at(self, pose: Pose) -> tuple[Lane, float]:
-        """The lane under a pose that runs its way, and the arc length there. Raises ValueError over 4 m off any."""
+        """The lane under a pose that runs its way, and the arc length there (m). Raises ValueError over 4 m off any."""
         best: tuple[float, Lane, float] | None = None
-        boxes = self._boxes
-        around = (boxes[:, :2] < (pose.x + 4.0, pose.y + 4.0)) & (boxes[:, 2:] > (pose.x - 4.0, pose.y - 4.0))
+        low, high, at = self._boxes[:, :2], self._boxes[:, 2:], (pose.x, pose.y)
+        around = (low < np.add(at, ON_LANE)) & (high > np.subtract(at, ON_LANE))
         for lane in (self.driveable[i] for i in np.flatnonzero(around.all(1))):
             hit = lane.line.project(pose.x, pose.y)
-            if math.cos(hit.heading - pose.heading) > 0.5 and (best is None or abs(hit.left) < best[0]):
+            same_way = math.cos(hit.heading - pose.heading) > 0.5
+            if same_way and (best is None or abs(hit.left) < best[0]):
                 best = (abs(hit.left), lane, hit.s)
-        if best is None or best[0] > 4.0:
+        if best is None or best[0] > ON_LANE:
             raise ValueError(
                 f"found no lane of {self.name} at ({pose.x:.1f}, {pose.y:.1f}) with heading {_degrees(pose)}, "
                 f"wanted a place on a lane: the nearest is {self._nearest(pose.x, pose.y)}"
@@ -133,113 +148,3 @@ class RoadNetwork:
 def _degrees(pose: Pose) -> str:
     """A heading as a person types it."""
     return f"{math.degrees(pose.heading):.0f}°"
-
-
-def _allows_cars(lane: sumolib.net.lane.Lane) -> bool:
-    return bool(lane.allows("passenger"))
-
-
-def _read_lanes(net: sumolib.net.Net) -> dict[str, Lane]:
-    lanes: dict[str, Lane] = {}
-    for edge in net.getEdges(withInternal=True):
-        for raw in edge.getLanes():
-            line = np.array(raw.getShape())[:, :2]
-            if not _allows_cars(raw) or np.linalg.norm(np.diff(line, axis=0), axis=1).sum() < 1e-3:
-                continue
-            internal = edge.getFunction() == "internal"
-            lanes[raw.getID()] = Lane(raw.getID(), Polyline(line), raw.getWidth(), raw.getSpeed() * 3.6, internal)
-    return lanes
-
-
-def _is_crossing(node: sumolib.net.node.Node) -> bool:
-    """Whether a node is a true junction: cars come in from more than two sides."""
-    incoming = (e for e in node.getIncoming() if e.getFunction() != "internal")
-    return sum(any(map(_allows_cars, e.getLanes())) for e in incoming) > 2
-
-
-def _join(net: sumolib.net.Net, lanes: dict[str, Lane]) -> dict[str, Lane]:
-    """Adds successors, turns and lights to bare lanes."""
-    joined = {}
-    turns: dict[str, tuple[Command | None, tuple[str, int] | None]] = {}
-    for lane in lanes.values():
-        onward = [c for c in net.getLane(lane.id).getOutgoing() if c.getToLane().getID() in lanes]
-        successors = tuple(c.getViaLaneID() if c.getViaLaneID() in lanes else c.getToLane().getID() for c in onward)
-        joined[lane.id] = Lane(lane.id, lane.line, lane.width, lane.limit, lane.internal, successors)
-        for connection, via in zip(onward, successors, strict=True):
-            if lane.internal:
-                turns.setdefault(via, (None, None)) if lanes[via].internal else None
-                continue
-            turn = _TURNS.get(connection.getDirection()) if _is_crossing(connection.getJunction()) else None
-            turns[via] = (turn, (connection.getTLSID(), connection.getTLLinkIndex()) if connection.getTLSID() else None)
-    for via, (turn, light) in turns.items():
-        b = joined[via]
-        if b.internal:
-            joined[via] = Lane(b.id, b.line, b.width, b.limit, True, b.successors, turn, light)
-    return joined
-
-
-def stop_line(lane: Lane) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The two ends of the stop line across a lane's end, left end first."""
-    end = lane.line.pose_at(lane.line.length)
-    left, right = moved(end, left=lane.width / 2), moved(end, left=-lane.width / 2)
-    return (left.x, left.y), (right.x, right.y)
-
-
-def beside(lane: Lane, s: float) -> Pose:
-    """Where a post stands on the right of a lane, facing its traffic."""
-    return moved(lane.line.pose_at(s), left=-(lane.width / 2 + POST_BESIDE_LANE))
-
-
-def _read_posts(net: sumolib.net.Net, lanes: dict[str, Lane], standing: list[Pose] | None) -> tuple[LightPost, ...]:
-    """One post for each approach to a light: at the stop line, or the standing post of a map that faces it."""
-    posts = []
-    for lane in lanes.values():
-        links = [c for c in net.getLane(lane.id).getOutgoing() if c.getTLSID()]
-        if lane.internal or not links or net.getEdge(links[0].getFrom().getID()).getToNode().getType() == "dead_end":
-            continue
-        pose = beside(lane, lane.line.length) if standing is None else _facing(standing, lane)
-        if pose is not None:
-            indices = tuple(sorted(c.getTLLinkIndex() for c in links))
-            posts.append(LightPost(links[0].getTLSID(), lane.id, indices, pose, stop_line(lane)))
-    return tuple(posts)
-
-
-def _facing(standing: list[Pose], lane: Lane) -> Pose | None:
-    """The nearest standing post at the right of a lane's end that faces its traffic, or None."""
-    end = lane.line.pose_at(lane.line.length)
-    near = []
-    for pose in standing:
-        ahead, left = to_local(end, np.array([pose.x, pose.y]))
-        if -12 < ahead < 12 and -9 < left < -1 and abs(wrap_angle(pose.heading - end.heading)) < math.pi / 4:
-            near.append((abs(ahead), pose))
-    return min(near, key=lambda pair: pair[0])[1] if near else None
-
-
-def signs_at_limit_changes(lanes: dict[str, Lane]) -> tuple[Sign, ...]:
-    """A sign where the limit changes, and one along each street after a junction."""
-    signs = []
-    before = {s: lane for lane in lanes.values() for s in lane.successors}
-    for lane in lanes.values():
-        if lane.internal:
-            continue
-        via = before.get(lane.id)
-        previous = before.get(via.id) if via is not None and via.internal else via
-        limit = round(lane.limit)
-        after_junction = via is None or via.turn is not None
-        if previous is not None and not after_junction and round(previous.limit) != limit:
-            signs.append(Sign(beside(lane, 2.0), limit))
-        elif after_junction and lane.line.length > 40:
-            signs.append(Sign(beside(lane, lane.line.length * 0.4), limit))
-    return tuple(signs)
-
-
-def read_roads(
-    name: str, network: Path, style: str, posts: list[Pose] | None = None, signs: Iterable[Sign] | None = None
-) -> RoadNetwork:
-    """Reads a SUMO network. posts and signs: those of an OpenDRIVE map; None puts them where our towns have them."""
-    net = sumolib.net.readNet(str(network), withInternal=True)
-    lanes = _join(net, _read_lanes(net))
-    if not any(not lane.internal for lane in lanes.values()):
-        raise ValueError(f"found no driving lane in {name}: give a map with lanes of type driving")
-    found = tuple(signs) if signs is not None else signs_at_limit_changes(lanes)
-    return RoadNetwork(name, network, style, lanes, _read_posts(net, lanes, posts), found)

@@ -46,8 +46,8 @@ def _along_polynomial(start: Pose, shape: ET.Element, ds: float, length: float) 
     return moved(start, float(np.polyval(u, p)), float(np.polyval(v, p)), turn)
 
 
-def _standing(road: ET.Element, thing: ET.Element, heading_name: str) -> Pose:
-    """Pose of a sign or signal; heading: that of the traffic it faces, which drives on the right."""
+def _pose(road: ET.Element, thing: ET.Element, heading_name: str) -> Pose:
+    """Of a sign or signal; heading: that of the traffic it faces, which drives on the right."""
     s, t = _number(thing, "s"), _number(thing, "t")
     geometries = road.findall("planView/geometry")
     here = [g for g in geometries if _number(g, "s") <= s + 1e-6][-1]
@@ -71,9 +71,11 @@ def read_furniture(path: Path) -> tuple[list[Pose], list[Sign]]:
         root = ET.parse(path).getroot()
         furniture = _furniture(root)
     except (ET.ParseError, ValueError, IndexError) as error:
-        raise ValueError(f"{path} is no readable OpenDRIVE map ({error}): give another .xodr file") from error
+        raise ValueError(
+            f"found that {path} is no OpenDRIVE map ({error}), wanted one: give another .xodr file"
+        ) from error
     if root.tag != "OpenDRIVE":
-        raise ValueError(f"{path} holds <{root.tag}>, wanted <OpenDRIVE>: give an .xodr file")
+        raise ValueError(f"found <{root.tag}> in {path}, wanted <OpenDRIVE>: give another .xodr file")
     return furniture
 
 
@@ -83,8 +85,8 @@ def _furniture(root: ET.Element) -> tuple[list[Pose], list[Sign]]:
         for thing in [*road.findall("signals/signal"), *road.findall("objects/object")]:
             limit = _limit(thing)
             if limit is not None:
-                pose = _standing(road, thing, "hOffset" if thing.tag == "signal" else "hdg")
+                pose = _pose(road, thing, "hOffset" if thing.tag == "signal" else "hdg")
                 signs[(round(pose.x), round(pose.y), limit)] = Sign(pose, limit)
             elif thing.tag == "signal" and thing.get("type") == _LIGHT_TYPE:
-                posts.append(_standing(road, thing, "hOffset"))
+                posts.append(_pose(road, thing, "hOffset"))
     return posts, list(signs.values())

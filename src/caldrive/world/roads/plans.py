@@ -18,25 +18,30 @@ import numpy as np
 
 from caldrive.datatypes import KMH, Points
 
-LANE_WIDTH = 4.0
-CORNER_RADIUS = 20.0
-AFTER_JUNCTION, BEFORE_JUNCTION, BEFORE_JUNCTION_FAST = 22.0, 48.0, 75.0
-FREE_FOR_60, FREE_FOR_90, RUN_UP = 36.0, 110.0, 36.0
+LANE_WIDTH = 4.0  # m
+CORNER_RADIUS = 20.0  # m
+AFTER_JUNCTION, BEFORE_JUNCTION, BEFORE_JUNCTION_FAST = 22.0, 48.0, 75.0  # m with a limit of 30
+FREE_FOR_60, FREE_FOR_90 = 36.0, 110.0  # m between those that allow a higher limit
+RUN_UP = 36.0  # m of 60 before 90
 
 
 @dataclass(frozen=True)
 class Street:
-    """A street from one junction to another through corner points, which are rounded."""
+    """A street from one junction to another."""
 
     start: str
     end: str
     corners: tuple[tuple[float, float], ...] = ()
+    """Points on the way, which are rounded, m."""
 
 
 @dataclass(frozen=True)
 class Plan:
+    """A town before it is a network."""
+
     name: str
     junctions: dict[str, tuple[float, float]]
+    """Their middles (m) by their names."""
     streets: tuple[Street, ...]
 
 
@@ -69,7 +74,8 @@ PLANS = {plan.name: plan for plan in (TOWN01, TOWN02)}
 
 
 def rounded(points: Points, radius: float) -> tuple[Points, list[tuple[float, float]]]:
-    """A polyline with its corners rounded, and the stretches (from, to) in metres along it that bend."""
+    """A polyline (N, 2) with its corners rounded by a radius in m, and the stretches (from, to) in m along it that
+    bend."""
     line, bends, travelled = [points[0]], [], 0.0
     for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
         u, v = (p / np.linalg.norm(p) for p in (before - corner, after - corner))
@@ -88,19 +94,22 @@ def rounded(points: Points, radius: float) -> tuple[Points, list[tuple[float, fl
 
 
 def limits(length: float, bends: list[tuple[float, float]]) -> list[tuple[float, int]]:
-    """Where which limit starts along a street, in the direction of travel: (metres, km/h), the first at 0."""
-    found: list[tuple[float, int]] = [(0.0, 30)]
+    """Where which limit starts along a street in the direction of travel: (m, km/h), the first at 0.
+
+    length in m; bends: stretches (from, to) in m.
+    """
+    profile: list[tuple[float, int]] = [(0.0, 30)]
     starts = [0.0] + [end for _, end in bends]
     ends = [begin for begin, _ in bends] + [length]
     for start, end in zip(starts, ends, strict=True):
         free = end - BEFORE_JUNCTION - (start + AFTER_JUNCTION)
         if free < FREE_FOR_60:
             continue
-        found.append((start + AFTER_JUNCTION, 60))
+        profile.append((start + AFTER_JUNCTION, 60))
         if free >= FREE_FOR_90:
-            found.append((start + AFTER_JUNCTION + RUN_UP, 90))
-        found.append((end - (BEFORE_JUNCTION_FAST if free >= FREE_FOR_90 else BEFORE_JUNCTION), 30))
-    return found
+            profile.append((start + AFTER_JUNCTION + RUN_UP, 90))
+        profile.append((end - (BEFORE_JUNCTION_FAST if free >= FREE_FOR_90 else BEFORE_JUNCTION), 30))
+    return profile
 
 
 def _limit_at(profile: list[tuple[float, int]], s: float) -> int:

@@ -21,21 +21,27 @@ PLANNED_SPEED = 10 * KMH  # the pace that sets the time limit (section 4)
 
 @dataclass(frozen=True)
 class Turn:
-    """A junction on the route: from where to where along it (m), and the command."""
+    """A junction on the route."""
 
     start: float
+    """m along the route."""
     end: float
+    """m along the route."""
     command: Command
 
 
 @dataclass(frozen=True)
 class Route:
-    """A line of lane centres to follow; the goal lies `length` metres along it. lanes: ids with where each begins."""
+    """A line of lane centres to follow."""
 
     line: Polyline
+    """It goes on beyond the goal."""
     length: float
+    """m along the line to the goal."""
     turns: tuple[Turn, ...]
+    """The junctions up to the goal."""
     lanes: tuple[tuple[str, float], ...]
+    """Ids, and where along the line each lane begins (m; the first one's begin lies before it)."""
 
     def command_at(self, s: float) -> Command:
         """Straight by default; a junction's command from 20 m before it until it is left behind."""
@@ -56,6 +62,7 @@ class Route:
 
 @lru_cache(maxsize=8)
 def _graph(roads: RoadNetwork) -> nx.DiGraph:
+    """Lanes as nodes; an edge is as long as the lane that it leaves."""
     graph = nx.DiGraph()
     for lane in roads.lanes.values():
         for successor in lane.successors:
@@ -77,10 +84,13 @@ def _turns(roads: RoadNetwork, lanes: list[tuple[str, float]]) -> tuple[Turn, ..
 
 
 def _onward(roads: RoadNetwork, lane: Lane) -> Lane | None:
-    """The straightest successor."""
-    following = [roads.lanes[s] for s in lane.successors]
+    """The straightest successor, None where the road ends."""
     end = lane.line.heading_at(lane.line.length)
-    return max(following, key=lambda one: math.cos(one.line.heading_at(one.line.length) - end), default=None)
+
+    def straightness(successor: Lane) -> float:
+        return math.cos(successor.line.heading_at(successor.line.length) - end)
+
+    return max((roads.lanes[id] for id in lane.successors), key=straightness, default=None)
 
 
 def _thinned(points: Points) -> Points:
@@ -94,7 +104,8 @@ def _thinned(points: Points) -> Points:
 
 def follow_lanes(roads: RoadNetwork, ids: list[str], start: float, end: float) -> Route:
     """The route along connected lanes from `start` m on the first to `end` m on the last."""
-    first, path = roads.lanes[ids[0]], [roads.lanes[i] for i in ids]
+    path = [roads.lanes[id] for id in ids]
+    first = path[0]
     length = sum(lane.line.length for lane in path[:-1]) - start + end
     reached = length + path[-1].line.length - end
     while reached < length + BEYOND_GOAL and (following := _onward(roads, path[-1])) is not None:
@@ -107,7 +118,7 @@ def follow_lanes(roads: RoadNetwork, ids: list[str], start: float, end: float) -
     lanes = [(lane.id, float(s)) for lane, s in zip(path, begins, strict=True)]
     inside = [turn for turn in _turns(roads, lanes) if turn.start < length]
     line = Polyline(_thinned(np.concatenate([*points])))
-    return Route(line, length, tuple(inside), tuple(lanes))
+    return Route(line, length, turns=tuple(inside), lanes=tuple(lanes))
 
 
 def plan_route(roads: RoadNetwork, start: Pose, goal: Pose) -> Route:
@@ -127,7 +138,7 @@ def plan_route(roads: RoadNetwork, start: Pose, goal: Pose) -> Route:
             ids = nx.astar_path(_graph(roads), successor, last.id, heuristic=beeline, weight="length")
         except nx.NetworkXNoPath:
             continue
-        length = sum(roads.lanes[i].line.length for i in ids)
+        length = sum(roads.lanes[id].line.length for id in ids)
         if best is None or length < best[0]:
             best = (length, ids)
     if best is None:

@@ -8,7 +8,8 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from caldrive.world.roads.network import RoadNetwork, read_roads
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.sumo_reader import read_roads
 
 TOWNS = ("town01", "town02")
 
@@ -30,7 +31,7 @@ def _cache_folder() -> Path:
 def load_roads(town: str) -> RoadNetwork:
     """The roads of `town01`, `town02` or an OpenDRIVE file. Raises ValueError or FileNotFoundError."""
     if town in TOWNS:
-        return read_roads(town, _DATA / f"{town}.net.xml", style=town)
+        return read_roads(town, _DATA / f"{town}.net.xml", appearance=town)
     path = Path(town)
     if path.suffix != ".xodr":
         raise ValueError(
@@ -50,4 +51,4 @@ def _load_opendrive(path: Path) -> RoadNetwork:
     network = _cache_folder() / f"{path.stem}-{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}.net.xml"
     if not network.is_file():
         convert_opendrive(path, network)
-    return read_roads(path.stem, network, style="town01", posts=posts, signs=signs)
+    return read_roads(path.stem, network, appearance="town01", posts=posts, signs=signs)

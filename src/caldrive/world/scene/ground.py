@@ -1,8 +1,8 @@
 """The ground: lane strips with their markings, junctions, kerbs, sidewalks and the yards behind them.
 
-The lines themselves are drawn by the road shader; a strip carries what it needs: uv = (metres left of the lane's
-middle, dashes travelled along its left line, metres to the stop line), color = (kind of the left line, kind of the
-right line, half width in units of 2 cm).
+The markings themselves are drawn by the road's shader; a strip carries what it needs: uv = (metres left of the lane's
+middle, dashes from the start along its left line, metres to the stop line), color = (`Border` to the left, `Border` to
+the right, half width in units of 2 cm).
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ from numpy.typing import NDArray
 from caldrive.datatypes import Points
 from caldrive.geometry import Polyline
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.scene.decor import Ground
-from caldrive.world.scene.meshes import RGB, VERTEX, Mesh, merge, packed, quads
-from caldrive.world.scene.streets import Border, Chain, chains
-from caldrive.world.scene.textures import Tex
+from caldrive.world.scene.appearance import GroundCover
+from caldrive.world.scene.meshes import VERTEX, Mesh, Surface, merge, mesh_of_quads, packed, quads
+from caldrive.world.scene.streets import Border, LaneChain, lane_chains
 
-Look = tuple[RGB, Tex]
-KERB_HEIGHT = 0.12
-KERB_WIDTH = 0.2
-SOLID_NEAR_JUNCTION = 18.0  # m
-SOLID = 4  # a centre line near a junction
-YARD_LEVEL = -0.05
+KERB_HEIGHT = 0.12  # m
+KERB_WIDTH = 0.2  # m
+SOLID_NEAR_JUNCTION = 18.0  # m in which centre lines are solid
+YARD_LEVEL = -0.05  # m
+YARD_MARGIN = 600.0  # m of ground around the roads
 FAR_AWAY = 900.0  # m to a stop line where there is none
 LONGEST = 24.0  # m of one piece of ground, so that what lies out of sight is left out
+UNITS_PER_METRE = 50  # of the half width in a vertex's colour
+JUNCTION_HALF_WIDTH = 5.0  # m, which tells the shader that no lane runs here
+UP = packed((0, 0, 1))
 
 
 def _normals(points: Points) -> Points:
@@ -52,94 +53,91 @@ def _resampled(line: Polyline, cuts: tuple[float, ...] = ()) -> tuple[NDArray[np
     return at, np.stack([np.interp(at, line.s, line.points[:, k]) for k in (0, 1)], axis=1)
 
 
-def _strip(chain: Chain, dash: float) -> Mesh:
-    """One lane from junction to junction; at the road's edge it reaches a little under the kerb."""
-    zone = min(SOLID_NEAR_JUNCTION, chain.line.length / 2)
-    s, points = _resampled(chain.line, (zone, chain.line.length - zone))
+def _strip(chain: LaneChain, dash: float) -> Mesh:
+    """One lane from junction to junction; at the road's edge it reaches a little under the kerb. dash: m of a dash and
+    a gap."""
+    length = chain.line.length
+    zone = min(SOLID_NEAR_JUNCTION, length / 2)
+    s, points = _resampled(chain.line, (zone, length - zone))
     under_kerb = 0.1 * np.array([chain.left == Border.EDGE, chain.right == Border.EDGE])
     across = np.array([1, -1]) * (chain.width / 2 + under_kerb)
     xy = points[:, None] + across[:, None] * _normals(points)[:, None]
     left_s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(xy[:, 0], axis=0), axis=1))))
     phase = left_s / left_s[-1] * max(1, round(left_s[-1] / dash))
-    to_stop = chain.line.length - s if chain.stop else np.full(len(s), FAR_AWAY)
+    to_stop = length - s if chain.stop else np.full(len(s), FAR_AWAY)
     rows = np.zeros((len(s), 2), VERTEX)
     rows["position"][..., :2] = xy
     rows["uv"] = np.stack(np.broadcast_arrays(across, phase[:, None], to_stop[:, None]), axis=-1)
-    rows["normal"] = packed((0, 0, 1))
-    made = np.stack((rows[:-1, 1], rows[1:, 1], rows[1:, 0], rows[:-1, 0]), axis=1)
+    rows["normal"] = UP
+    vertices = np.stack((rows[:-1, 1], rows[1:, 1], rows[1:, 0], rows[:-1, 0]), axis=1)
     middle = (s[:-1] + s[1:]) / 2
-    near = (middle < zone) | (middle > chain.line.length - zone)
-    left = np.where(near & (chain.left == Border.CENTER), SOLID, chain.left)
-    color = np.stack(np.broadcast_arrays(left, chain.right, round(chain.width * 25)), axis=-1)
-    made["color"] = color[:, None]
-    return _from_corners(made)
+    near_junction = (middle < zone) | (middle > length - zone)
+    left = np.where(near_junction & (chain.left == Border.CENTER), Border.SOLID_CENTER, chain.left)
+    half_width = round(chain.width / 2 * UNITS_PER_METRE)
+    vertices["color"] = np.stack(np.broadcast_arrays(left, chain.right, half_width), axis=-1)[:, None]
+    return mesh_of_quads(vertices)
 
 
-def _from_corners(corners: NDArray[np.void]) -> Mesh:
-    first = 4 * np.arange(len(corners), dtype=np.uint32)[:, None, None]
-    return Mesh(corners.reshape(-1), (first + np.array([[0, 1, 2], [0, 2, 3]], np.uint32)).reshape(-1, 3))
-
-
-def _junctions(roads: RoadNetwork, streets: list[Chain]) -> Mesh:
+def _junctions(roads: RoadNetwork, streets: Sequence[LaneChain]) -> Mesh:
     """The asphalt that no strip covers; it reaches a little under the strips, so that no gap shows."""
-    strips = [shapely.LineString(c.line.points).buffer(c.width / 2, cap_style="flat") for c in streets]
+    strips = [shapely.LineString(lane.line.points).buffer(lane.width / 2, cap_style="flat") for lane in streets]
     left_over = roads.roadway.difference(shapely.union_all(strips).buffer(-0.25)).buffer(-0.02).simplify(0.01)
-    parts = [p for p in shapely.get_parts(left_over) if p.area > 0.05]
+    parts = [part for part in shapely.get_parts(left_over) if part.area > 0.05]
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.MultiPolygon(parts)))
     ring = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
-    made = np.zeros(len(ring), VERTEX)
-    made["position"] = np.column_stack((ring, np.full(len(ring), -0.01)))
-    made["uv"] = (0, 0, FAR_AWAY)
-    made["normal"] = packed((0, 0, 1))
-    made["color"][:, 2] = 250
-    return Mesh(made, np.arange(len(ring), dtype=np.uint32).reshape(-1, 3))
+    vertices = np.zeros(len(ring), VERTEX)
+    vertices["position"] = np.column_stack((ring, np.full(len(ring), -0.01)))
+    vertices["uv"] = (0, 0, FAR_AWAY)
+    vertices["normal"] = UP
+    vertices["color"][:, 2] = round(JUNCTION_HALF_WIDTH * UNITS_PER_METRE)
+    return Mesh(vertices, np.arange(len(ring), dtype=np.uint32).reshape(-1, 3))
 
 
-def road_mesh(roads: RoadNetwork, ground: Ground) -> Mesh:
-    """All asphalt, for the road shader."""
-    streets = chains(roads)
-    return merge((*(_strip(c, ground.dash) for c in streets), _junctions(roads, streets)))
+def road_mesh(roads: RoadNetwork, ground: GroundCover) -> Mesh:
+    """All asphalt, for the road's shader."""
+    streets = lane_chains(roads)
+    return merge((*(_strip(street, ground.dash) for street in streets), _junctions(roads, streets)))
 
 
-def _bands(ring: shapely.LinearRing, lines: Sequence[tuple[float, float]], looks: Sequence[Look], tile: float) -> Mesh:
-    """Strips along an edge of the roadway, which lies to the ring's left, between lines (metres from it, height)."""
+def _bands(ring: shapely.LinearRing, lines: Sequence[tuple[float, float]], surfaces: Sequence[Surface]) -> Mesh:
+    """Strips along an edge of the roadway, which lies to the ring's left: one of each surface between lines, which are
+    (m from the edge, height in m)."""
     s, points = _resampled(Polyline(shapely.get_coordinates(ring)))
     away = -_normals(points)
     rows = [np.column_stack((points + d * away, np.full(len(points), z))) for d, z in lines]
     parts = []
-    for low, high, (color, texture), (near, _), (far, _) in zip(rows, rows[1:], looks, lines, lines[1:], strict=False):
+    for (low, high), ((near, _), (far, _)), surface in zip(pairwise(rows), pairwise(lines), surfaces, strict=True):
         uv = np.zeros((len(s) - 1, 4, 3))
-        uv[..., 0] = np.stack((s[:-1], s[1:], s[1:], s[:-1]), axis=1) / tile
-        uv[..., 1] = np.array((far, far, near, near)) / tile
-        uv[..., 2] = texture
-        parts.append(quads(np.stack((high[:-1], high[1:], low[1:], low[:-1]), axis=1), color, uv))
+        uv[..., 0] = np.stack((s[:-1], s[1:], s[1:], s[:-1]), axis=1) / surface.tile
+        uv[..., 1] = np.array((far, far, near, near)) / surface.tile
+        uv[..., 2] = surface.layer
+        parts.append(quads(np.stack((high[:-1], high[1:], low[1:], low[:-1]), axis=1), surface.color, uv))
     return merge(parts)
 
 
 def _edges(roads: RoadNetwork, tolerance: float) -> list[shapely.LinearRing]:
+    """The roadway's borders, up to a tolerance in m, with the road on their left."""
     area = shapely.orient_polygons(roads.roadway.simplify(tolerance))
-    return [ring for p in shapely.get_parts(area) for ring in (p.exterior, *p.interiors)]
+    return [ring for part in shapely.get_parts(area) for ring in (part.exterior, *part.interiors)]
 
 
-def kerb_mesh(roads: RoadNetwork, ground: Ground) -> Mesh:
+def kerb_mesh(roads: RoadNetwork, ground: GroundCover) -> Mesh:
     """Kerbs and sidewalks as seen from near."""
-    layer, tint, tile = ground.pavement
+    kerb = Surface(ground.kerb, tile=ground.pavement.tile)
     lines = ((0.0, -0.02), (0.0, KERB_HEIGHT), (KERB_WIDTH, KERB_HEIGHT), (SIDEWALK_WIDTH, KERB_HEIGHT))
-    looks = ((ground.kerb, Tex.PLAIN), (ground.kerb, Tex.PLAIN), (tint, layer))
-    return merge([_bands(ring, lines, looks, tile) for ring in _edges(roads, 0.02)])
+    return merge([_bands(ring, lines, (kerb, kerb, ground.pavement)) for ring in _edges(roads, 0.02)])
 
 
-def far_kerb_mesh(roads: RoadNetwork, ground: Ground) -> Mesh:
+def far_kerb_mesh(roads: RoadNetwork, ground: GroundCover) -> Mesh:
     """The same as seen from afar: one slope, so low that kerbs and sidewalks lie on it where they are drawn."""
-    layer, tint, tile = ground.pavement
     lines = ((0.0, -0.015), (SIDEWALK_WIDTH, KERB_HEIGHT - 0.03))
-    return merge([_bands(ring, lines, ((tint, layer),), tile) for ring in _edges(roads, 0.2)])
+    return merge([_bands(ring, lines, (ground.pavement,)) for ring in _edges(roads, 0.2)])
 
 
-def yard_mesh(roads: RoadNetwork, ground: Ground, margin: float = 600.0) -> Mesh:
+def yard_mesh(roads: RoadNetwork, ground: GroundCover) -> Mesh:
     """One wide plane a little below the road."""
-    layer, tint, tile = ground.yard
-    x0, y0, x1, y1 = np.add(roads.bounds, (-margin, -margin, margin, margin))
+    yard = ground.yard
+    x0, y0, x1, y1 = np.add(roads.bounds, (-YARD_MARGIN, -YARD_MARGIN, YARD_MARGIN, YARD_MARGIN))
     corners = np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]])
-    uv = np.concatenate((corners / tile, np.full((1, 4, 1), float(layer))), axis=2)
-    return quads(np.concatenate((corners, np.full((1, 4, 1), YARD_LEVEL)), axis=2), tint, uv)
+    uv = np.concatenate((corners / yard.tile, np.full((1, 4, 1), float(yard.layer))), axis=2)
+    return quads(np.concatenate((corners, np.full((1, 4, 1), YARD_LEVEL)), axis=2), yard.color, uv)

@@ -16,45 +16,50 @@ from caldrive.world.scene.scenery import Prop
 
 RESOLUTION = 0.25  # m of one pixel
 MARGIN = 30.0  # m around the roads
-TALLEST = 32.0  # m, the value of a full pixel
-Heights = NDArray[np.uint8]  # in units of TALLEST / 255
+TALLEST_SHADOW = 32.0  # m, the value of a full pixel
+Heights = NDArray[np.uint8]  # (rows, columns), row 0 at the lowest y, in units of TALLEST_SHADOW / 255
+Bounds = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max in m
 
 
 def _units(height: float) -> int:
-    return round(min(height / TALLEST, 1.0) * 255)
+    return round(min(height / TALLEST_SHADOW, 1.0) * 255)
 
 
-def _drawn(props: Sequence[Prop], bounds: tuple[float, float, float, float], kind: str) -> Heights:
-    """Heights of the tops of all props of a kind, seen from above; row 0 at the lowest y."""
+def _drawn(props: Sequence[Prop], bounds: Bounds, kind: str) -> Heights:
+    """Heights of the tops of all props of a kind, seen from above."""
     x0, y0, x1, y1 = bounds
     size = (round((x1 - x0) / RESOLUTION), round((y1 - y0) / RESOLUTION))
     picture = Image.new("L", size, 0)
     draw = ImageDraw.Draw(picture)
-    for p in sorted((p for p in props if p.kind == kind), key=lambda p: p.height):
+    for prop in sorted((prop for prop in props if prop.kind == kind), key=lambda prop: prop.height):
         if kind == "tree":
-            r, x, y = 0.2 * p.height / RESOLUTION, (p.pose.x - x0) / RESOLUTION, (p.pose.y - y0) / RESOLUTION
-            draw.ellipse((x - r, y - r, x + r, y + r), fill=_units(0.8 * p.height))
+            x, y = (prop.pose.x - x0) / RESOLUTION, (prop.pose.y - y0) / RESOLUTION
+            radius = 0.2 * prop.height / RESOLUTION
+            draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=_units(0.8 * prop.height))
         else:
-            corners = (box_corners(p.pose, p.length, p.width) - (x0, y0)) / RESOLUTION
-            draw.polygon([(u, v) for u, v in corners.tolist()], fill=_units(p.height))
+            corners = (box_corners(prop.pose, prop.length, prop.width) - (x0, y0)) / RESOLUTION
+            draw.polygon([(u, v) for u, v in corners.tolist()], fill=_units(prop.height))
     return np.asarray(picture)
 
 
 def _shifted(heights: Heights, columns: int, rows: int) -> Heights:
     """The picture seen from a pixel that lies (columns, rows) away, 0 beyond the edges."""
-    moved = np.zeros_like(heights)
+    shifted = np.zeros_like(heights)
     h, w = heights.shape
     to_x, from_x = slice(max(0, -columns), min(w, w - columns)), slice(max(0, columns), min(w, w + columns))
     to_y, from_y = slice(max(0, -rows), min(h, h - rows)), slice(max(0, rows), min(h, h + rows))
     if abs(columns) < w and abs(rows) < h:
-        moved[to_y, to_x] = heights[from_y, from_x]
-    return moved
+        shifted[to_y, to_x] = heights[from_y, from_x]
+    return shifted
 
 
-def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
-    """Heights below which the air is in shade: each pixel takes over its neighbour's towards the sun, less the fall."""
+def cast_shadows(heights: Heights, sun: NDArray[np.float64]) -> Heights:
+    """Heights below which the air is in shade, from the heights of what stands there and the direction (3,) to the sun.
+
+    Each pixel takes over its neighbour's height towards the sun, less the fall; the neighbours' distance doubles.
+    """
     flat = float(np.hypot(sun[0], sun[1]))
-    fall, shade = float(sun[2]) / flat * 255 / TALLEST, heights.copy()
+    fall, shade = float(sun[2]) / flat * 255 / TALLEST_SHADOW, heights.copy()
     reach, step = float(heights.max()) / fall, RESOLUTION
     while step < reach:
         columns, rows = (round(step * float(s) / flat / RESOLUTION) for s in sun[:2])
@@ -64,8 +69,8 @@ def cast(heights: Heights, sun: NDArray[np.float64]) -> Heights:
     return shade
 
 
-def town_bounds(roads_bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """The rectangle that the shadow picture covers."""
+def shadow_bounds(roads_bounds: Bounds) -> Bounds:
+    """The rectangle that the shadow picture of a town covers, from that of its roads."""
     x0, y0, x1, y1 = roads_bounds
     return x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
 
@@ -77,10 +82,8 @@ def _softened(heights: Heights) -> Heights:
     return soft
 
 
-def shadow_heights(
-    props: Sequence[Prop], bounds: tuple[float, float, float, float], sun: NDArray[np.float64]
-) -> NDArray[np.uint8]:
-    """Shadow heights (rows, columns, 2) in units of TALLEST / 255: of buildings with trees, of buildings alone."""
-    houses = cast(_drawn(props, bounds, "building"), sun)
-    trees = cast(_drawn(props, bounds, "tree"), sun)
+def shadow_heights(props: Sequence[Prop], bounds: Bounds, sun: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Shadow heights (rows, columns, 2): of buildings with trees, and of buildings alone. sun: direction (3,) to it."""
+    houses = cast_shadows(_drawn(props, bounds, "building"), sun)
+    trees = cast_shadows(_drawn(props, bounds, "tree"), sun)
     return np.stack((_softened(np.maximum(houses, trees)), _softened(houses)), axis=-1)

@@ -1,4 +1,4 @@
-"""Streets as the painter of markings sees them: lanes joined from junction to junction, and their borders."""
+"""Streets as road markings see them: lanes joined from junction to junction, and what is painted beside them."""
 
 from __future__ import annotations
 
@@ -18,24 +18,53 @@ class Border(IntEnum):
     """What is painted along one side of a lane."""
 
     NOTHING = 0
-    CENTER = 1  # broken, solid near junctions
+    CENTER = 1  # broken
     EDGE = 2
     DIVIDER = 3  # parts lanes of one direction
+    SOLID_CENTER = 4  # a centre line near a junction
 
 
 @dataclass(frozen=True)
-class Chain:
-    """Lanes one after the other between two junctions. stop: whether a stop line ends it."""
+class LaneChain:
+    """Lanes one after the other between two junctions."""
 
     line: Polyline
+    """Their middle."""
     width: float
+    """m."""
     left: Border
     right: Border
     stop: bool
+    """Whether a stop line ends it."""
+
+
+def lane_chains(roads: RoadNetwork) -> list[LaneChain]:
+    """All streets of a town; places where only the limit changes do not break them."""
+    lanes, posts = roads.lanes, {post.lane for post in roads.posts}
+    inside = _inside_junctions(lanes)
+    painted = [lane for lane in lanes.values() if lane.id not in inside]
+    continued = {_following(lane, inside) for lane in painted}
+    starts = [lane for lane in painted if lane.id not in continued]
+    neighbours, seen, chains = _LaneSegments(roads.driveable), set[str](), []
+    for first in [*starts, *painted]:  # the second turn takes up closed rings, which have no start
+        parts = _walk(first, lanes, inside, seen)
+        if parts:
+            points = shapely.LineString(np.concatenate([lane.line.points for lane in parts])).simplify(0.02)
+            longest = max(parts, key=lambda lane: lane.line.length)
+            chains.append(
+                LaneChain(
+                    line=Polyline(shapely.get_coordinates(points)),
+                    width=longest.width,
+                    left=neighbours.border(longest, side=1),
+                    right=neighbours.border(longest, side=-1),
+                    stop=parts[-1].id in posts,
+                )
+            )
+    return chains
 
 
 def _inside_junctions(lanes: dict[str, Lane]) -> set[str]:
-    """Internal lanes of true junctions, with those that follow them inside."""
+    """Ids of internal lanes of true junctions, with those that follow them inside."""
     inside = {lane.id for lane in lanes.values() if lane.turn is not None}
     frontier = list(inside)
     while frontier:
@@ -51,6 +80,7 @@ def _following(lane: Lane, inside: set[str]) -> str | None:
 
 
 def _walk(first: Lane, lanes: dict[str, Lane], inside: set[str], seen: set[str]) -> list[Lane]:
+    """Lanes from the first to the end of its street, up to one seen before."""
     parts: list[Lane] = []
     id: str | None = first.id
     while id is not None and id not in seen:
@@ -60,8 +90,8 @@ def _walk(first: Lane, lanes: dict[str, Lane], inside: set[str], seen: set[str])
     return parts
 
 
-class _Beside:
-    """Finds the direction of the traffic under a point."""
+class _LaneSegments:
+    """The segments of all lanes' middles, to find the direction of the traffic at a point."""
 
     def __init__(self, lanes: tuple[Lane, ...]) -> None:
         self.starts = np.concatenate([lane.line.points[:-1] for lane in lanes])
@@ -69,6 +99,7 @@ class _Beside:
         self.headings = np.concatenate([lane.line.headings for lane in lanes])
 
     def heading(self, point: NDArray[np.float64], within: float) -> float | None:
+        """The heading (rad) of the lane nearest to a point (2,), None where there is none within so many metres."""
         along = self.ends - self.starts
         t = ((point - self.starts) * along).sum(1) / np.maximum((along**2).sum(1), 1e-9)
         gap = np.hypot(*(point - self.starts - np.clip(t, 0, 1)[:, None] * along).T)
@@ -80,28 +111,9 @@ class _Beside:
         middle = lane.line.pose_at(lane.line.length / 2)
         reach = side * (lane.width / 2 + 1.0)
         point = np.array([middle.x - reach * math.sin(middle.heading), middle.y + reach * math.cos(middle.heading)])
-        beyond = self.heading(point, lane.width / 2)
+        beyond = self.heading(point, within=lane.width / 2)
         if beyond is None:
             return Border.EDGE
         if math.cos(beyond - middle.heading) < 0:
             return Border.CENTER
         return Border.DIVIDER if side > 0 else Border.NOTHING
-
-
-def chains(roads: RoadNetwork) -> list[Chain]:
-    """All streets of a town; places where only the limit changes do not break them."""
-    lanes, posts = roads.lanes, {post.lane for post in roads.posts}
-    inside = _inside_junctions(lanes)
-    drawn = [lane for lane in lanes.values() if lane.id not in inside]
-    continued = {_following(lane, inside) for lane in drawn}
-    starts = [lane for lane in drawn if lane.id not in continued]
-    beside, seen, found = _Beside(roads.driveable), set[str](), []
-    for first in [*starts, *drawn]:  # the second turn takes up closed rings, which have no start
-        parts = _walk(first, lanes, inside, seen)
-        if parts:
-            points = shapely.LineString(np.concatenate([p.line.points for p in parts])).simplify(0.02)
-            line = Polyline(shapely.get_coordinates(points))
-            longest = max(parts, key=lambda p: p.line.length)
-            left, right = beside.border(longest, 1), beside.border(longest, -1)
-            found.append(Chain(line, longest.width, left, right, parts[-1].id in posts))
-    return found

@@ -1,4 +1,4 @@
-"""The texture array: all surfaces, façades and signs, drawn once at start from a fixed seed."""
+"""The texture array: all surfaces, façades and signs, drawn once in a process from a fixed seed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from caldrive.world.scene import facades
-from caldrive.world.scene.patterns import RGB, SIZE, Layer, asphalt, flipped, leaves, paving, speckled
+from caldrive.world.scene.meshes import RGB
+from caldrive.world.scene.patterns import SIZE, Layer, asphalt, flipped, leaves, paving, speckled
 
 
 class Tex(IntEnum):
@@ -43,7 +44,7 @@ class Tex(IntEnum):
     SETTS = 25
     PLANKS = 26
     CONCRETE = 27
-    INVENTED_A = 28  # façades of nowhere, for decors made up at random
+    INVENTED_A = 28  # façades of nowhere, for domain randomisation
     INVENTED_B = 29
     INVENTED_C = 30
     INVENTED_D = 31
@@ -68,7 +69,7 @@ _FACADES = {
 
 def _sign(limit: int) -> Layer:
     """A round sign: white, a red ring, the limit in bold digits as wide as the white allows."""
-    big = 4 * SIZE
+    big = 4 * SIZE  # drawn large and shrunk, for smooth edges
     picture = Image.new("RGB", (big, big), (192, 20, 28))
     draw = ImageDraw.Draw(picture)
     rim = int(0.105 * big)
@@ -80,6 +81,7 @@ def _sign(limit: int) -> Layer:
 
 
 def _poster(ground: RGB, mark: RGB, word: str) -> Layer:
+    """A disc over a word, both of one colour."""
     picture = Image.new("RGB", (SIZE, SIZE), ground)
     draw = ImageDraw.Draw(picture)
     draw.ellipse((SIZE * 0.3, SIZE * 0.08, SIZE * 0.7, SIZE * 0.48), fill=mark)
@@ -90,25 +92,24 @@ def _poster(ground: RGB, mark: RGB, word: str) -> Layer:
 def texture_layers() -> NDArray[np.uint8]:
     """All layers (34, SIZE, SIZE, 3), bottom row first, in the order of `Tex`."""
     rng = np.random.default_rng(20180614)
-    plain = np.full((SIZE, SIZE, 3), 255, np.uint8)
-    layers = {
-        Tex.PLAIN: plain,
+    layers = {  # the order of the rows is the order of the random numbers
+        Tex.PLAIN: np.full((SIZE, SIZE, 3), 255, np.uint8),
         Tex.ASPHALT: asphalt(rng),
-        Tex.SLABS: paving((196, 192, 186), 0.72, 4, 4, rng),
-        Tex.BRICKS: paving((208, 196, 190), 0.74, 12, 6, rng),
-        Tex.GRASS: leaves((112, 138, 74), rng, 8),
-        Tex.GRAVEL: speckled((176, 162, 136), rng, 0.14, 0.10, 8),
-        Tex.LEAVES: leaves((226, 232, 214), rng, 10),
-        Tex.NEEDLES: leaves((214, 222, 214), rng, 20),
-        Tex.TILES: paving((214, 206, 202), 0.66, 12, 8, rng),
+        Tex.SLABS: paving((196, 192, 186), joint=0.72, rows=4, columns=4, rng=rng),
+        Tex.BRICKS: paving((208, 196, 190), joint=0.74, rows=12, columns=6, rng=rng),
+        Tex.GRASS: leaves((112, 138, 74), rng, cells=8),
+        Tex.GRAVEL: speckled((176, 162, 136), rng, fine=0.14, coarse=0.10, cells=8),
+        Tex.LEAVES: leaves((226, 232, 214), rng, cells=10),
+        Tex.NEEDLES: leaves((214, 222, 214), rng, cells=20),
+        Tex.TILES: paving((214, 206, 202), joint=0.66, rows=12, columns=8, rng=rng),
         **{layer: draw(rng) for layer, draw in _FACADES.items()},
         **{layer: _sign(limit) for limit, layer in SIGN_LAYERS.items()},
-        Tex.POSTER_A: _poster((222, 176, 58), (60, 44, 40), "JAZZ"),
-        Tex.POSTER_B: _poster((58, 110, 128), (238, 236, 220), "EXPO"),
-        Tex.PLATES: paving((214, 212, 208), 0.8, 2, 2, rng),
-        Tex.SETTS: paving((206, 204, 200), 0.6, 10, 10, rng),
-        Tex.PLANKS: paving((212, 206, 198), 0.7, 12, 1, rng),
-        Tex.CONCRETE: speckled((206, 204, 202), rng, 0.05, 0.16, 4),
+        Tex.POSTER_A: _poster(ground=(222, 176, 58), mark=(60, 44, 40), word="JAZZ"),
+        Tex.POSTER_B: _poster(ground=(58, 110, 128), mark=(238, 236, 220), word="EXPO"),
+        Tex.PLATES: paving((214, 212, 208), joint=0.8, rows=2, columns=2, rng=rng),
+        Tex.SETTS: paving((206, 204, 200), joint=0.6, rows=10, columns=10, rng=rng),
+        Tex.PLANKS: paving((212, 206, 198), joint=0.7, rows=12, columns=1, rng=rng),
+        Tex.CONCRETE: speckled((206, 204, 202), rng, fine=0.05, coarse=0.16, cells=4),
         **{layer: facades.invented(rng) for layer in Tex if layer.name.startswith("INVENTED")},
     }
-    return np.stack([layers[t] for t in Tex])
+    return np.stack([layers[tex] for tex in Tex])

@@ -13,71 +13,89 @@ from caldrive.geometry import box_corners, push_out, to_local
 
 PERSON_MASS, CAR_MASS = 75.0, 1400.0  # kg
 TOUCH = 1e-6  # m: boxes that overlap by less, as after a push, have no contact
+STANDING = 0.3  # m/s below which the ego runs into nobody
+BUMPER = 0.8  # m from the front on which a person must be touched for it to be the ego's fault
+_MASSES = {ContactKind.PERSON: PERSON_MASS, ContactKind.CAR: CAR_MASS, ContactKind.OBJECT: math.inf}
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A box that may be hit. speed: along its heading, m/s."""
+    """A box that may be hit."""
 
     kind: ContactKind
     id: str
     pose: Pose
+    """Of its centre."""
     length: float
+    """m along its heading."""
     width: float
+    """m."""
     speed: float = 0.0
+    """m/s along its heading."""
 
 
-def obstacle_of(thing: VehicleState | PedestrianState) -> Obstacle:
-    if isinstance(thing, VehicleState):
-        return Obstacle(ContactKind.CAR, thing.id, thing.pose, thing.length, thing.width, thing.speed)
-    return Obstacle(ContactKind.PERSON, thing.id, thing.pose, 2 * thing.radius, 2 * thing.radius, thing.speed)
+def obstacle_of(actor: VehicleState | PedestrianState) -> Obstacle:
+    """The box around a car or a person."""
+    if isinstance(actor, VehicleState):
+        return Obstacle(
+            ContactKind.CAR, actor.id, actor.pose, length=actor.length, width=actor.width, speed=actor.speed
+        )
+    size = 2 * actor.radius
+    return Obstacle(ContactKind.PERSON, actor.id, actor.pose, length=size, width=size, speed=actor.speed)
 
 
-def _at_fault(ego: VehicleState, touch: Points, other: Obstacle) -> bool:
+def _at_fault(ego: VehicleState, touch: Points, obstacle: Obstacle) -> bool:
     """The ego is at fault where its moving front or flank runs into something, not where it is run into."""
     x = float(to_local(ego.pose, touch)[0])
-    if ego.speed < 0.3 or x < 0:
-        return other.kind is ContactKind.OBJECT
-    if other.kind is ContactKind.PERSON:
-        return bool(x > ego.length / 2 - 0.8)
+    if ego.speed < STANDING or x < 0:
+        return obstacle.kind is ContactKind.OBJECT
+    if obstacle.kind is ContactKind.PERSON:
+        return bool(x > ego.length / 2 - BUMPER)
     return True
 
 
-def _impulse(ego: VehicleState, other: Obstacle, normal: Points) -> float:
-    """Impulse (N s) of an inelastic hit along a unit normal that points away from the obstacle."""
-    own = ego.speed * np.array([math.cos(ego.pose.heading), math.sin(ego.pose.heading)])
-    his = other.speed * np.array([math.cos(other.pose.heading), math.sin(other.pose.heading)])
-    closing = max(0.0, float((his - own) @ normal))
-    mass = {ContactKind.PERSON: PERSON_MASS, ContactKind.CAR: CAR_MASS, ContactKind.OBJECT: math.inf}[other.kind]
+def _impulse(ego: VehicleState, obstacle: Obstacle, normal: Points) -> float:
+    """Impulse (N s) of an inelastic hit along a unit normal (2,) that points away from the obstacle."""
+    closing = max(0.0, float((_velocity(obstacle) - _velocity(ego)) @ normal))
+    mass = _MASSES[obstacle.kind]
     reduced = CAR_MASS if math.isinf(mass) else CAR_MASS * mass / (CAR_MASS + mass)
     return reduced * closing
 
 
+def _velocity(body: VehicleState | Obstacle) -> Points:
+    """(2,) in m/s."""
+    return body.speed * np.array([math.cos(body.pose.heading), math.sin(body.pose.heading)])
+
+
 def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleState, tuple[Contact, ...]]:
-    """The ego pushed out of what it overlaps and slowed (from behind: sped up) by it; a glancing hit slides along."""
+    """The ego pushed out of what it overlaps and slowed (from behind: sped up) by it, and the contacts; a glancing hit
+    slides along."""
     contacts = []
-    for other in obstacles:
-        reach = math.hypot(ego.length + other.length, ego.width + other.width) / 2
-        if math.hypot(other.pose.x - ego.pose.x, other.pose.y - ego.pose.y) > reach:
+    for obstacle in obstacles:
+        reach = math.hypot(ego.length + obstacle.length, ego.width + obstacle.width) / 2
+        if math.hypot(obstacle.pose.x - ego.pose.x, obstacle.pose.y - ego.pose.y) > reach:
             continue
         shift = push_out(
-            box_corners(ego.pose, ego.length, ego.width), box_corners(other.pose, other.length, other.width)
+            moving=box_corners(ego.pose, ego.length, ego.width),
+            fixed=box_corners(obstacle.pose, obstacle.length, obstacle.width),
         )
         depth = 0.0 if shift is None else float(np.linalg.norm(shift))
         if shift is None or depth < TOUCH:
             continue
         normal = shift / depth
-        impulse = _impulse(ego, other, normal)
-        touch = np.array([other.pose.x, other.pose.y])
-        contacts.append(Contact(other.kind, other.id, impulse, _at_fault(ego, touch, other)))
-        ego = _pushed(ego, other, shift, normal, impulse)
+        impulse = _impulse(ego, obstacle, normal)
+        touch = np.array([obstacle.pose.x, obstacle.pose.y])
+        contacts.append(Contact(obstacle.kind, obstacle.id, impulse, at_fault=_at_fault(ego, touch, obstacle)))
+        ego = _pushed(ego, obstacle, shift, impulse)
     return ego, tuple(contacts)
 
 
-def _pushed(ego: VehicleState, other: Obstacle, shift: Points, normal: Points, impulse: float) -> VehicleState:
+def _pushed(ego: VehicleState, obstacle: Obstacle, shift: Points, impulse: float) -> VehicleState:
+    """The ego after a hit: shifted by a vector (2,) in m, its speed changed by an impulse (N s) along that."""
+    normal = shift / float(np.linalg.norm(shift))
     along = float(normal @ (math.cos(ego.pose.heading), math.sin(ego.pose.heading)))
     speed = max(0.0, ego.speed + along * impulse / CAR_MASS)
-    if other.kind is ContactKind.PERSON:  # a person is knocked aside and does not hold the car
+    if obstacle.kind is ContactKind.PERSON:  # a person is knocked aside and does not hold the car
         return replace(ego, speed=speed)
     pose = Pose(ego.pose.x + float(shift[0]), ego.pose.y + float(shift[1]), ego.pose.heading)
     return replace(ego, pose=pose, speed=speed)

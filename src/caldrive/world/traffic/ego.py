@@ -1,4 +1,4 @@
-"""Settings as frozen dataclasses. Presets are instances; nothing here computes."""
+"""The ego: a bicycle model with lagging throttle and brake, a limited steering rate, and tyres of limited grip."""
 
 from __future__ import annotations
 
@@ -7,42 +7,59 @@ from dataclasses import dataclass
 
 from caldrive.datatypes import Control, Pose
 
-
-@dataclass(frozen=True)
-class VehicleConfig:
-    """The ego: a compact car. Angles in rad, accelerations in m/s², times in s, mass in kg."""
-
-    length: float = 4.2
-    width: float = 1.8
-    wheelbase: float = 2.6
-    front_axle: float = 1.3  # m ahead of the centre
-    max_steer: float = 0.6109  # 35°
-    steer_rate: float = 2.0
-    max_acceleration: float = 3.8  # at standstill; the thrust falls evenly to 0 at top_speed
-    max_brake: float = 8.0
-    top_speed: float = 45.0
-    throttle_lag: float = 0.25
-    brake_lag: float = 0.08
-    max_lateral: float = 8.0  # m/s², what the tyres give before the car understeers
-    drag: float = 0.0008  # 1/m
-    rolling: float = 0.25
-    mass: float = 1400.0
-
-
 SUBSTEP = 0.01  # s
 
 
 @dataclass(frozen=True)
+class VehicleConfig:
+    """A compact car. The defaults are those of the ego in all results."""
+
+    length: float = 4.2
+    """m."""
+    width: float = 1.8
+    """m."""
+    wheelbase: float = 2.6
+    """m between the axles."""
+    front_axle: float = 1.3
+    """m ahead of the centre."""
+    max_steer: float = 0.6109
+    """rad, the largest angle of the wheels: 35°."""
+    steer_rate: float = 2.0
+    """rad/s with which the wheels turn."""
+    max_acceleration: float = 3.8
+    """m/s² at standstill; the thrust falls evenly to 0 at top_speed."""
+    max_brake: float = 8.0
+    """m/s²."""
+    top_speed: float = 45.0
+    """m/s."""
+    throttle_lag: float = 0.25
+    """s, time constant of the throttle."""
+    brake_lag: float = 0.08
+    """s, time constant of the brake."""
+    max_lateral: float = 8.0
+    """m/s², what the tyres give before the car understeers."""
+    drag: float = 0.0008
+    """1/m, deceleration by the air for each (m/s)²."""
+    rolling: float = 0.25
+    """m/s², deceleration by the wheels."""
+
+
+@dataclass(frozen=True)
 class EgoState:
-    """pose of the centre; speed along the heading (m/s); wheel angle (rad, + left); what throttle and brake really give
-    in [0, 1]; mean acceleration along the heading over the last step (m/s²)."""
+    """Where the ego is, how it moves, and what its actuators do."""
 
     pose: Pose
+    """Of its centre."""
     speed: float = 0.0
+    """m/s along the heading."""
     steer_angle: float = 0.0
+    """rad, of the wheels, + to the left."""
     throttle_response: float = 0.0
+    """What the throttle really gives, in [0, 1]."""
     brake_response: float = 0.0
+    """What the brake really gives, in [0, 1]."""
     acceleration: float = 0.0
+    """m/s² along the heading, mean over the last step."""
 
 
 def _clip(value: float, most: float) -> float:
@@ -79,4 +96,11 @@ def advance(state: EgoState, control: Control, dt: float, config: VehicleConfig)
         y += h * mean * s + rear * turn * c
         heading += turn
     pose = Pose(x, y, math.remainder(heading, math.tau))
-    return EgoState(pose, speed, angle, throttle, brake, (speed - state.speed) / dt)
+    return EgoState(
+        pose=pose,
+        speed=speed,
+        steer_angle=angle,
+        throttle_response=throttle,
+        brake_response=brake,
+        acceleration=(speed - state.speed) / dt,
+    )

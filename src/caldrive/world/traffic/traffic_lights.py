@@ -21,37 +21,45 @@ SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
 YELLOW = 3.5  # s: a car that starts to brake for it and loses sight of it in A1 still gets through
 SHORTEST_CLEARING, LONGEST_CLEARING = 1.0, 20.0  # s with all lights red, until nobody is left inside the junction
 LOOP = 24.0  # m before the stop line where somebody who waits is noticed
+HALF_CAR = 2.0  # m from a car's front to its centre, about
+LOOP_HALF_WIDTH = 2.0  # m to either side of the approach
+JUST_BEYOND = 0.5  # m past the stop line where somebody still waits
+INSIDE = 4.0  # m nearer to the middle than the stop lines: inside the junction
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Which approach has its turn, what it shows, and since when (s)."""
+    """Which approach of a junction has its turn; all others show red."""
 
     approach: int
+    """Its number."""
     state: LightState
+    """What it shows."""
     since: float
+    """s."""
 
 
 def next_phase(phase: Phase, time: float, waiting: list[bool], occupied: bool) -> Phase:
-    """The phase after a look at who waits at which approach, and whether the junction is occupied."""
+    """The phase after a look at who waits at which approach, and whether the junction is occupied; time in s."""
     lasted = time - phase.since
-    others = [k for k in _order_after(phase.approach, len(waiting)) if waiting[k]]
+    candidates = [k for k in _order_after(phase.approach, len(waiting)) if waiting[k]]
     if phase.state is LightState.GREEN:
         enough = LONGEST_GREEN if waiting[phase.approach] else SHORTEST_GREEN
-        return Phase(phase.approach, LightState.YELLOW, time) if others and lasted >= enough else phase
+        return Phase(phase.approach, LightState.YELLOW, time) if candidates and lasted >= enough else phase
     if phase.state is LightState.YELLOW:
         return Phase(phase.approach, LightState.RED, time) if lasted >= YELLOW else phase
     cleared = lasted >= (LONGEST_CLEARING if occupied else SHORTEST_CLEARING)
     if not cleared:
         return phase
-    return Phase(others[0] if others else phase.approach, LightState.GREEN, time)
+    return Phase(candidates[0] if candidates else phase.approach, LightState.GREEN, time)
 
 
 def _order_after(k: int, n: int) -> list[int]:
+    """The other n - 1 approaches in the order of their turns after k."""
     return [(k + i) % n for i in range(1, n)]
 
 
-class Junction:
+class JunctionLights:
     """The lights of one junction. posts: its approaches in the order of their turns."""
 
     def __init__(self, posts: tuple[LightPost, ...], phase: Phase) -> None:
@@ -71,10 +79,10 @@ class Junction:
         return [self.phase.state if i == self.phase.approach else LightState.RED for i in range(len(self.posts))]
 
 
-class _Detectors:
-    """Loops before all stop lines and inside all junctions, looked at in one go."""
+class _LoopDetectors:
+    """Loops in the road before all stop lines and inside all junctions, looked at in one go."""
 
-    def __init__(self, junctions: Iterable[Junction]) -> None:
+    def __init__(self, junctions: Iterable[JunctionLights]) -> None:
         groups = [np.array([np.mean(post.stop_line, axis=0) for post in junction.posts]) for junction in junctions]
         self.stops = np.concatenate(groups)
         headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
@@ -83,30 +91,29 @@ class _Detectors:
         self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
 
     def look(self, poses: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Who waits at which post (in order), and which junctions are occupied; poses: x, y, heading of (N, 3) cars."""
+        """Whether somebody waits at each post (P,), and whether each junction is occupied (J,); poses: x, y, heading of
+        cars (N, 3)."""
         d = poses[None, :, :2] - self.stops[:, None]
         u, v = self.forward[:, None, 0], self.forward[:, None, 1]
         ahead, left = d[..., 0] * u + d[..., 1] * v, d[..., 1] * u - d[..., 0] * v
         same_way = np.cos(poses[:, 2]) * u + np.sin(poses[:, 2]) * v > 0.7
-        waiting = ((ahead > -LOOP - 2.0) & (ahead < 0.5) & (np.abs(left) < 2.0) & same_way).any(1)
+        before_line = (ahead > -LOOP - HALF_CAR) & (ahead < JUST_BEYOND)
+        waiting = (before_line & (np.abs(left) < LOOP_HALF_WIDTH) & same_way).any(1)
         away = np.hypot(*np.moveaxis(poses[None, :, :2] - self.centers[:, None], -1, 0))
-        return waiting, (away < self.radii[:, None] - 4.0).any(1)
+        return waiting, (away < self.radii[:, None] - INSIDE).any(1)
 
 
-class Lights:
-    """All traffic lights of a town; who has the first green is drawn from rng."""
+class TrafficLights:
+    """All traffic lights of a town; who has the first green is drawn from rng. junctions: by the light's id."""
 
     def __init__(self, roads: RoadNetwork, rng: np.random.Generator) -> None:
         grouped: dict[str, list[LightPost]] = defaultdict(list)
         for post in roads.posts:
             grouped[post.light].append(post)
         self.junctions = {
-            name: Junction(
-                tuple(posts), Phase(int(rng.integers(len(posts))), LightState.GREEN, -float(rng.uniform(0, 4)))
-            )
-            for name, posts in sorted(grouped.items())
+            name: JunctionLights(tuple(posts), _first_phase(len(posts), rng)) for name, posts in sorted(grouped.items())
         }
-        self._detectors = _Detectors(self.junctions.values()) if self.junctions else None
+        self._detectors = _LoopDetectors(self.junctions.values()) if self.junctions else None
 
     def step(self, time: float, cars: Iterable[VehicleState]) -> None:
         """Moves all junctions on to a time (s), given everybody who drives."""
@@ -121,6 +128,11 @@ class Lights:
                 junction.change(phase)
             first = last
 
-    def shown(self) -> tuple[TrafficLight, ...]:
-        """Every light with what it shows."""
+    def states(self) -> tuple[TrafficLight, ...]:
+        """Every light with what it shows now."""
         return tuple(light for junction in self.junctions.values() for light in junction.lights)
+
+
+def _first_phase(n: int, rng: np.random.Generator) -> Phase:
+    """Green for one of n approaches, for some seconds already."""
+    return Phase(int(rng.integers(n)), LightState.GREEN, since=-float(rng.uniform(0, 4)))

@@ -1,10 +1,11 @@
-"""The other cars: SUMO in process. It knows the ego as one of its vehicles and is told the state of the lights.
+"""The other cars: SUMO in this process. It knows the ego as one of its vehicles, and is told what the lights show.
 
 SUMO's conventions end here: its positions are those of front bumpers, its angles run clockwise from north in degrees.
 """
 
 from __future__ import annotations
 
+import gc
 import math
 import weakref
 from collections.abc import Sequence
@@ -13,41 +14,43 @@ from pathlib import Path
 import libsumo
 import numpy as np
 
-from caldrive.datatypes import LightState, PedestrianState, Pose, VehicleState
+from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
-from caldrive.world.traffic.traffic_lights import Lights, Phase
+from caldrive.world.traffic.sumo_inputs import SumoLights, speed_caps
+from caldrive.world.traffic.traffic_lights import TrafficLights
 
 EGO = "ego"
 DRIVERS = Path(__file__).with_name("drivers.add.xml")
 SPACING = 12.0  # m of lane that a car takes at the start
-CLEAR_OF_EGO = 18.0  # m
+CLEAR_OF_EGO = 18.0  # m around the ego that stay free at the start
 LONGEST_WAIT = 60.0  # s until a car that is stuck is moved elsewhere
 OUT_OF_SIGHT, BESIDE = 70.0, 25.0  # m from the ego, where its camera looks and elsewhere
-PEOPLE_AHEAD, COMFORTABLE_BRAKE = 30.0, 4.0  # m, m/s²
+LONGEST_WAY, LAST_EDGES = 30, 6  # edges of a random way, and how many of it are left when it gets a new one
+CHECK_EVERY = 20  # steps, from one look after cars that are stuck or near the end of their way to the next
 MODELS = (("compact", 4.2, 1.76), ("estate", 4.6, 1.8), ("van", 4.9, 1.95))  # name, length, width in m
-_LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
 
 
-def places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
+def start_places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
     """Where in a town a car may stand at the start: on which lane, and how far along it (m)."""
     return [(lane, float(s)) for lane in roads.driveable for s in np.arange(SPACING, lane.line.length - 2.0, SPACING)]
 
 
 def room(roads: RoadNetwork) -> int:
     """How many cars a town holds, wherever the ego stands."""
-    here = np.array([(pose.x, pose.y) for pose in (lane.line.pose_at(s) for lane, s in places(roads))]).reshape(-1, 2)
-    apart = np.linalg.norm(here[:, None] - here[None], axis=-1)
+    poses = [lane.line.pose_at(s) for lane, s in start_places(roads)]
+    places = np.array([(pose.x, pose.y) for pose in poses]).reshape(-1, 2)
+    apart = np.linalg.norm(places[:, None] - places[None], axis=-1)
     near = (apart <= CLEAR_OF_EGO + SPACING / 2).sum(axis=1)  # the ego may stand between two places
-    return len(here) - int(near.max(initial=0))
+    return len(places) - int(near.max(initial=0))
 
 
 def free_places(roads: RoadNetwork, n: int, ego: Pose) -> list[tuple[Lane, float]]:
     """Where a car may stand at the start, away from the ego. Raises ValueError where there is no room for n."""
     free = []
-    for lane, s in places(roads):
-        here = lane.line.pose_at(s)
-        if math.hypot(here.x - ego.x, here.y - ego.y) > CLEAR_OF_EGO:
+    for lane, s in start_places(roads):
+        place = lane.line.pose_at(s)
+        if math.hypot(place.x - ego.x, place.y - ego.y) > CLEAR_OF_EGO:
             free.append((lane, s))
     if n > len(free):
         raise ValueError(
@@ -63,47 +66,35 @@ def _take_sumo(traffic: Traffic) -> None:
     """Notes whose SUMO it is from now on. Raises RuntimeError where it is another's."""
     global _driving
     if _driving is not None and _driving() is not None:
+        gc.collect()  # a world that nobody holds any more may still lie around
+    if _driving is not None and _driving() is not None:
         raise RuntimeError(
-            "found another world with traffic in this process, where SUMO can simulate one: "
+            "found another world with traffic in this process, wanted none, as SUMO simulates one at a time: "
             "close() that world first, or give each world a process of its own"
         )
     _driving = weakref.ref(traffic)
 
 
 class Traffic:
-    """One SUMO simulation; there can be one in a process, until its `release`.
+    """One SUMO simulation of n cars; there can be one in a process, until its `release`.
 
-    Raises ValueError for more cars than the town holds, RuntimeError where another one is under way.
-
-    cars: all but the ego, as of the last step.
+    cars: all but the ego, as of the last step. Raises ValueError for more cars than the town holds, RuntimeError where
+    another simulation is under way.
     """
 
-    def __init__(self, roads: RoadNetwork, n: int, seed: int, dt: float, ego: VehicleState, lights: Lights) -> None:
-        self.roads, self.rng, self.dt, self.lights = roads, np.random.default_rng(seed), dt, lights
+    def __init__(
+        self, roads: RoadNetwork, n: int, seed: int, dt: float, ego: VehicleState, lights: TrafficLights
+    ) -> None:
+        self.roads, self.rng, self.dt = roads, np.random.default_rng(seed), dt
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
-        begin = self._places(n, ego)
+        starts = self._random_places(n, ego)
         _take_sumo(self)
-        arguments = [
-            "-n", str(roads.network), "--step-length", str(dt), "--seed", str(seed % 2**31), "--no-step-log",
-            "--no-warnings", "--time-to-teleport", "-1", "--collision.action", "none", "--start",
-            "--default.speeddev", "0.05", "--additional-files", str(DRIVERS),
-        ]  # fmt: skip
-        if libsumo.isLoaded():
-            libsumo.load(arguments)
-        else:
-            libsumo.start(["sumo", *arguments])
-        for name, length, width in MODELS:
-            libsumo.vehicletype.copy("driver", name)
-            libsumo.vehicletype.setLength(name, length)
-            libsumo.vehicletype.setWidth(name, width)
+        _load(roads, dt, seed)
         self._add_ego(ego)
-        for name, (lane, s) in zip(self.size, begin, strict=True):
+        for name, (lane, s) in zip(self.size, starts, strict=True):
             self._add(name, lane, s)
-        self._shown: dict[str, str] = {}
-        self._phases: dict[str, Phase] = {}
-        self._held: set[str] = set()
-        self._open_unposted_lights()
-        self._show_lights()
+        self._capped: set[str] = set()  # cars that are told how fast they may drive
+        self._lights = SumoLights(lights)
         libsumo.simulationStep()
         self.cars = self._read()
 
@@ -118,22 +109,22 @@ class Traffic:
         if _driving is not None and _driving() is self:
             stop_sumo()
 
-    def _places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
+    def _random_places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
         """Random free places for n cars, away from the ego."""
         free = free_places(self.roads, n, ego.pose)
         return [free[int(i)] for i in self.rng.permutation(len(free))[:n]]
 
-    def _walk(self, edge: str, steps: int = 30) -> list[str]:
+    def _random_way(self, edge: str) -> list[str]:
         """A random way through the town, by edges."""
-        edges, lane = [edge], next(one for one in self.roads.driveable if _edge(one.id) == edge)
-        while len(edges) < steps and lane.successors:
+        edges, lane = [edge], next(lane for lane in self.roads.driveable if _edge(lane.id) == edge)
+        while len(edges) < LONGEST_WAY and lane.successors:
             lane = self.roads.lanes[lane.successors[int(self.rng.integers(len(lane.successors)))]]
             if not lane.internal:
                 edges.append(_edge(lane.id))
         return edges
 
     def _add(self, name: str, lane: Lane, s: float) -> None:
-        edges = self._walk(_edge(lane.id))
+        edges = self._random_way(_edge(lane.id))
         route = f"{name}@{libsumo.simulation.getTime():.1f}"
         libsumo.route.add(route, edges)
         model, index = self.size[name][0], lane.id.rsplit("_", 1)[1]
@@ -146,62 +137,34 @@ class Traffic:
         libsumo.vehicle.setLength(EGO, ego.length)
         libsumo.vehicle.setWidth(EGO, ego.width)
 
-    def _show_lights(self) -> None:
-        """Tells SUMO what the lights show; links without a post stay green."""
-        for name, junction in self.lights.junctions.items():
-            if self._phases.get(name) is junction.phase:
-                continue
-            self._phases[name] = junction.phase
-            if name not in self._shown:
-                self._shown[name] = "G" * len(libsumo.trafficlight.getControlledLinks(name))
-            row = list(self._shown[name])
-            for post, state in zip(junction.posts, junction.states(), strict=True):
-                for link in post.links:
-                    row[link] = _LETTER[state]
-            text = "".join(row)
-            libsumo.trafficlight.setRedYellowGreenState(name, text)
-            self._shown[name] = text
-
-    def _open_unposted_lights(self) -> None:
-        """A map may name lights where no post stands: nobody would know to wait there."""
-        for name in libsumo.trafficlight.getIDList():
-            links = len(libsumo.trafficlight.getControlledLinks(name))
-            libsumo.trafficlight.setRedYellowGreenState(name, "G" * links)
-
     def step(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
         """Moves the cars on by dt, under what the lights show now; time in s."""
         if _driving is None or _driving() is not self:
-            raise RuntimeError("found an episode whose SUMO another one has: reset its world before the next step")
-        self._show_lights()
+            raise RuntimeError(
+                "found an episode that has lost SUMO, which simulates one at a time, wanted a running one: "
+                "call reset(scenario)"
+            )
+        self._lights.update()
         front = moved(ego.pose, forward=ego.length / 2)
         angle = 90.0 - math.degrees(ego.pose.heading)
         libsumo.vehicle.moveToXY(EGO, "", -1, front.x, front.y, angle, keepRoute=2)
-        self._brake_for(people)
+        self._cap_speeds(people)
         libsumo.simulationStep()
-        if round(time / self.dt) % 20 == 0:
+        if round(time / self.dt) % CHECK_EVERY == 0:
             self._look_after(ego)
         self.cars = self._read()
 
-    def _brake_for(self, people: Sequence[PedestrianState]) -> None:
-        """SUMO's cars do not see our people: cap their speed so that they stop before anybody on the road."""
-        if not people and not self._held:
+    def _cap_speeds(self, people: Sequence[PedestrianState]) -> None:
+        """Lets cars stop before people on the road, and those drive on that had to."""
+        if not people and not self._capped:
             return
-        walkers = np.array([(p.pose.x, p.pose.y) for p in people if p.on_road]).reshape(-1, 2)
-        cars = np.array([(c.pose.x, c.pose.y, c.pose.heading, c.length, c.speed) for c in self.cars]).reshape(-1, 5)
-        d, u, v = walkers[None] - cars[:, None, :2], np.cos(cars[:, 2, None]), np.sin(cars[:, 2, None])
-        ahead = d[..., 0] * u + d[..., 1] * v - cars[:, 3, None] / 2
-        left = d[..., 1] * u - d[..., 0] * v
-        # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
-        near = (np.abs(left) < np.where(ahead > 1.0, 2.2, 1.2)) & (ahead > -1.0) & (ahead < PEOPLE_AHEAD)
-        gap = np.where(near, np.maximum(ahead - 2.5, 0.0), np.inf).min(axis=1, initial=np.inf)
-        allowed = np.sqrt(2 * COMFORTABLE_BRAKE * gap)
-        held = {self.cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < cars[:, 4] + 1.0)}
-        for name in sorted(self._held - held.keys()):
-            if any(car.id == name for car in self.cars):
-                libsumo.vehicle.setSpeed(name, -1.0)
-        for name, speed in held.items():
+        caps = speed_caps(self.cars, people)
+        present = {car.id for car in self.cars}
+        for name in sorted((self._capped - caps.keys()) & present):
+            libsumo.vehicle.setSpeed(name, -1.0)
+        for name, speed in caps.items():
             libsumo.vehicle.setSpeed(name, speed)
-        self._held = set(held)
+        self._capped = set(caps)
 
     def _look_after(self, ego: VehicleState) -> None:
         """Gives cars near the end of their way a new one, and moves those that are stuck while nobody sees it."""
@@ -209,24 +172,43 @@ class Traffic:
         for name in self.size:
             if name not in present:
                 if name not in libsumo.simulation.getPendingVehicles():
-                    self._add(name, *self._places(1, ego)[0])
+                    self._add(name, *self._random_places(1, ego)[0])
                 continue
             way, index = libsumo.vehicle.getRoute(name), libsumo.vehicle.getRouteIndex(name)
-            if index >= 0 and len(way) - index < 6 and libsumo.vehicle.getRoadID(name) == way[index]:
-                libsumo.vehicle.setRoute(name, self._walk(way[index]))
+            near_end = index >= 0 and len(way) - index < LAST_EDGES
+            if near_end and libsumo.vehicle.getRoadID(name) == way[index]:
+                libsumo.vehicle.setRoute(name, self._random_way(way[index]))
             stuck = libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT
             if stuck and not in_sight(ego, libsumo.vehicle.getPosition(name)):
                 libsumo.vehicle.remove(name)
 
     def _state(self, name: str) -> VehicleState:
+        """A car as SUMO has it, in our axes."""
         _, length, width = self.size[name]
         x, y = libsumo.vehicle.getPosition(name)
         heading = wrap_angle(math.radians(90.0 - libsumo.vehicle.getAngle(name)))
         center = moved(Pose(x, y, heading), forward=-length / 2)
-        return VehicleState(center, libsumo.vehicle.getSpeed(name), length, width, name)
+        return VehicleState(center, libsumo.vehicle.getSpeed(name), length=length, width=width, id=name)
 
     def _read(self) -> tuple[VehicleState, ...]:
         return tuple(self._state(name) for name in libsumo.vehicle.getIDList() if name != EGO)
+
+
+def _load(roads: RoadNetwork, dt: float, seed: int) -> None:
+    """Starts an empty simulation of a town, in the place of any other, with the kinds of cars that drive in it."""
+    arguments = [
+        "-n", str(roads.network), "--step-length", str(dt), "--seed", str(seed % 2**31), "--no-step-log",
+        "--no-warnings", "--time-to-teleport", "-1", "--collision.action", "none", "--start",
+        "--default.speeddev", "0.05", "--additional-files", str(DRIVERS),
+    ]  # fmt: skip
+    if libsumo.isLoaded():
+        libsumo.load(arguments)
+    else:
+        libsumo.start(["sumo", *arguments])
+    for name, length, width in MODELS:
+        libsumo.vehicletype.copy("driver", name)
+        libsumo.vehicletype.setLength(name, length)
+        libsumo.vehicletype.setWidth(name, width)
 
 
 def in_sight(ego: VehicleState, place: tuple[float, float]) -> bool:
@@ -237,6 +219,7 @@ def in_sight(ego: VehicleState, place: tuple[float, float]) -> bool:
 
 
 def _edge(lane: str) -> str:
+    """The id of the edge that a lane is part of."""
     return lane.rsplit("_", 1)[0]
 
 

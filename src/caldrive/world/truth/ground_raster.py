@@ -20,22 +20,21 @@ _SAMPLES = (12, 6)  # along and across the car
 
 
 class GroundRaster:
-    """A raster with sidewalks and the directions of the lanes outside junctions."""
+    """A raster with sidewalks and the lanes outside junctions, in cells of CELL metres."""
 
     def __init__(self, roads: RoadNetwork) -> None:
         x0, y0, x1, y1 = roads.bounds
         self.origin = np.array([x0 - MARGIN, y0 - MARGIN])
         self.shape = (math.ceil((y1 - y0 + 2 * MARGIN) / CELL), math.ceil((x1 - x0 + 2 * MARGIN) / CELL))
         self.sidewalk = self._draw([(polygon, 1) for polygon in roads.sidewalk.geoms]) == 1
-        strips = []
-        self.lines: list[Polyline] = []
-        for lane in roads.driveable:
-            strip = shapely.LineString(lane.line.points).buffer(lane.width / 2, cap_style="flat")
-            self.lines.append(lane.line)
-            strips.append((strip, len(self.lines)))
-        self.lane = self._draw(strips)
+        self.lines: list[Polyline] = [lane.line for lane in roads.driveable]
+        strips = [
+            shapely.LineString(lane.line.points).buffer(lane.width / 2, cap_style="flat") for lane in roads.driveable
+        ]
+        self.lane = self._draw([(strip, number) for number, strip in enumerate(strips, start=1)])  # 0: none
 
     def _draw(self, polygons: list[tuple[shapely.Polygon, int]]) -> NDArray[np.int32]:
+        """A raster (rows, columns) with each polygon's value where it lies, 0 elsewhere; later ones lie on top."""
         canvas = PILImage.new("I", (self.shape[1], self.shape[0]))
         brush = ImageDraw.Draw(canvas)
         for polygon, value in polygons:
@@ -47,17 +46,21 @@ class GroundRaster:
         return np.array(canvas, dtype=np.int32)
 
     def shares(self, car: VehicleState, travel: float) -> tuple[float, float]:
-        """Shares of the car's area on the opposite lane and on the sidewalk. travel: the route's heading there, rad."""
+        """Shares in [0, 1] of the car's area on the opposite lane and on the sidewalk. travel: the route's heading
+        there, rad."""
         cells = np.floor((_spread(car) - self.origin) / CELL).astype(int)
         inside = ((cells >= 0) & (cells < self.shape[::-1])).all(1)
         x, y = cells[inside].T
         lanes = self.lane[y, x]
         opposite = sum(
-            int((lanes == i).sum()) for i in np.unique(lanes) if i and self._opposes(int(i), car.pose, travel)
+            int((lanes == number).sum())
+            for number in np.unique(lanes)
+            if number and self._opposes(int(number), car.pose, travel)
         )
         return opposite / len(cells), float(self.sidewalk[y, x].sum()) / len(cells)
 
     def _opposes(self, number: int, pose: Pose, travel: float) -> bool:
+        """Whether traffic on a lane runs against a direction of travel (rad)."""
         return math.cos(self.lines[number - 1].project(pose.x, pose.y).heading - travel) < -0.5
 
 

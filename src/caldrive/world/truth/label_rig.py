@@ -32,20 +32,23 @@ IN_REACH = 40.0  # m within which signs and lights are looked at
 
 
 @dataclass(frozen=True)
-class Moment:
-    """Who and what is where. progress: metres of the route that the ego has driven."""
+class WorldState:
+    """Who and what is where at one time."""
 
     time: float
+    """s since the start of the episode."""
     ego: VehicleState
     vehicles: tuple[VehicleState, ...]
     pedestrians: tuple[PedestrianState, ...]
     lights: tuple[TrafficLight, ...]
     contacts: tuple[Contact, ...]
+    """Of the ego, in the last step."""
     progress: float
+    """m of the route that the ego has driven."""
 
 
 class LabelRig:
-    """Labels along a route through a town. front_axle: m from the ego's centre to its front axle."""
+    """Labels along an episode's route through a town. front_axle: m from the ego's centre to its front axle."""
 
     def __init__(self, town: Town, route: Route, scenario: Scenario, front_axle: float) -> None:
         self.town, self.route, self.scenario, self.front_axle = town, route, scenario, front_axle
@@ -57,61 +60,61 @@ class LabelRig:
     def _forks(self) -> list[Fork]:
         return forks(self.town.roads, self.route)
 
-    def label(self, ego: VehicleState, moment: Moment) -> Affordances:
-        """The affordances of a car at a moment."""
+    def label(self, ego: VehicleState, state: WorldState) -> Affordances:
+        """The affordances of a car among all others; ego: where that car is and how fast."""
         if self._lights_at is None:
-            self._lights_at = _positions(moment.lights)
+            self._lights_at = _positions(state.lights)
         return label(
             ego,
             self.front_axle,
             self.route.line,
-            near=moment.progress,
-            vehicles=moment.vehicles,
-            pedestrians=moment.pedestrians,
-            lights=[moment.lights[i] for i in _near(ego.pose, self._lights_at)],
+            near=state.progress,
+            vehicles=state.vehicles,
+            pedestrians=state.pedestrians,
+            lights=[state.lights[i] for i in _near(ego.pose, self._lights_at)],
             signs=[self.town.signs[i] for i in _near(ego.pose, self._signs_at)],
         )
 
-    def label_at(self, mount: CameraConfig, moment: Moment) -> Affordances:
+    def label_at(self, mount: CameraConfig, state: WorldState) -> Affordances:
         """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
-        return self.label(replace(moment.ego, pose=_under(moment.ego.pose, mount)), moment)
+        return self.label(replace(state.ego, pose=_pose_under(mount, state.ego.pose)), state)
 
-    def other_commands_at(self, mount: CameraConfig, moment: Moment) -> list[Alternative]:
+    def other_commands_at(self, mount: CameraConfig, state: WorldState) -> list[Alternative]:
         """What other commands would ask of such a car, where others could be given."""
-        axle = moved(_under(moment.ego.pose, mount), forward=self.front_axle)
-        return alternatives(axle, self._forks, moment.progress)
+        axle = moved(_pose_under(mount, state.ego.pose), forward=self.front_axle)
+        return alternatives(axle, self._forks, state.progress)
 
-    def truth(self, moment: Moment) -> Truth:
-        """All that is true of a moment."""
-        ego, goal = moment.ego, self.scenario.goal
-        travel = self.route.line.heading_at(moment.progress)
+    def truth(self, state: WorldState) -> Truth:
+        """All that is true of a state of the world."""
+        ego, goal = state.ego, self.scenario.goal
+        travel = self.route.line.heading_at(state.progress)
         opposite, sidewalk = self.town.ground.shares(ego, travel)
         return Truth(
-            time=moment.time,
+            time=state.time,
             ego=ego,
-            affordances=self.label(ego, moment),
-            vehicles=moment.vehicles,
-            pedestrians=moment.pedestrians,
-            lights=moment.lights,
-            contacts=moment.contacts,
+            affordances=self.label(ego, state),
+            vehicles=state.vehicles,
+            pedestrians=state.pedestrians,
+            lights=state.lights,
+            contacts=state.contacts,
             opposite_share=opposite,
             sidewalk_share=sidewalk,
-            route_done=min(moment.progress, self.route.length),
+            route_done=min(state.progress, self.route.length),
             route_length=self.route.length,
             goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
-            speed_limit=[limit for s, limit in self._limits if s <= moment.progress + 0.1][-1],
+            speed_limit=[limit for s, limit in self._limits if s <= state.progress + 0.1][-1],
         )
 
 
-def _positions(things: Sequence[Sign] | Sequence[TrafficLight]) -> Points:
-    return np.array([(thing.pose.x, thing.pose.y) for thing in things]).reshape(-1, 2)
+def _positions(posts: Sequence[Sign] | Sequence[TrafficLight]) -> Points:
+    return np.array([(post.pose.x, post.pose.y) for post in posts]).reshape(-1, 2)
 
 
 def _near(here: Pose, positions: Points) -> list[int]:
-    """Which of the positions lie within a square around here."""
+    """Which of the positions (N, 2) lie within a square around here."""
     return np.flatnonzero(np.abs(positions - (here.x, here.y)).max(axis=1, initial=0.0) < IN_REACH).tolist()
 
 
-def _under(ego: Pose, mount: CameraConfig) -> Pose:
+def _pose_under(mount: CameraConfig, ego: Pose) -> Pose:
     """Of the car whose camera, in the middle and straight ahead, would take the picture that this one takes."""
     return moved(moved(ego, mount.forward, mount.left, mount.yaw), forward=-mount.forward)

@@ -35,32 +35,35 @@ FACING = math.radians(45)  # a sign or light counts for traffic that runs within
 
 @dataclass(frozen=True)
 class Area:
-    """A rectangle ahead of the front axle in metres: near..far forward, right..left sideways (+ left)."""
+    """A rectangle ahead of the front axle, in m."""
 
     near: float
+    """Least distance forward."""
     far: float
+    """Greatest distance forward."""
     right: float
+    """Its right side, + to the left."""
     left: float
+    """Its left side, + to the left."""
 
     def contains(self, points: Points) -> NDArray[np.bool_]:
+        """Which points (..., 2) of the axle's frame lie in it."""
         x, y = points[..., 0], points[..., 1]
         return np.asarray((x >= self.near) & (x <= self.far) & (y >= self.right) & (y <= self.left))
 
 
 # The table in supplement 2.1. Its text calls x the lateral axis, but its numbers are (forward, left).
-A1 = Area(7.4, 14.0, -5.8, -0.8)
-
-A2 = Area(0.0, 8.2, -2.0, 2.0)
-
-A3 = Area(0.0, 50.0, -1.6, 1.6)
+A1 = Area(near=7.4, far=14.0, right=-5.8, left=-0.8)
+A2 = Area(near=0.0, far=8.2, right=-2.0, left=2.0)
+A3 = Area(near=0.0, far=50.0, right=-1.6, left=1.6)
 
 
-def _positions(things: Sequence[VehicleState] | Sequence[PedestrianState] | Sequence[Sign]) -> Points:
-    return np.array([(t.pose.x, t.pose.y) for t in things], dtype=float).reshape(-1, 2)
+def _positions(objects: Sequence[VehicleState] | Sequence[PedestrianState] | Sequence[Sign]) -> Points:
+    return np.array([(each.pose.x, each.pose.y) for each in objects], dtype=float).reshape(-1, 2)
 
 
 def hazard_stop(axle: Pose, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState]) -> bool:
-    """Whether the centre of a car or a person lies in A2."""
+    """Whether the centre of a car or a person lies in A2. axle: the middle of the ego's front axle."""
     both = np.concatenate((_positions(vehicles), _positions(pedestrians)))
     return bool(A2.contains(to_local(axle, both)).any())
 
@@ -89,12 +92,12 @@ def red_light(axle: Pose, lights: Sequence[TrafficLight], speed: float) -> bool:
 def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
     """The limit on the nearest sign in A1 that faces the ego, in km/h."""
     local = to_local(axle, _positions(signs))
-    seen = [
+    limits = [
         (x, sign.limit)
         for x, inside, sign in zip(local[:, 0], A1.contains(local), signs, strict=True)
         if inside and abs(wrap_angle(sign.pose.heading - axle.heading)) <= FACING
     ]
-    return min(seen)[1] if seen else None
+    return min(limits)[1] if limits else None
 
 
 def in_the_way(vehicle: VehicleState, route: Polyline, near: float | None) -> bool:
@@ -113,8 +116,8 @@ def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleSt
     """Shortest distance between the boxes of the ego and the closest car whose centre is in A3, else 50 m."""
     ahead = np.flatnonzero(A3.contains(to_local(axle, _positions(vehicles))))
     own = box_corners(ego.pose, ego.length, ego.width)
-    gaps = [polygon_distance(own, box_corners(v.pose, v.length, v.width)) for v in (vehicles[int(i)] for i in ahead)]
-    return min([*gaps, MAX_VEHICLE_DISTANCE])
+    boxes = [box_corners(v.pose, v.length, v.width) for v in (vehicles[int(i)] for i in ahead)]
+    return min([*(polygon_distance(own, box) for box in boxes), MAX_VEHICLE_DISTANCE])
 
 
 def to_line(axle: Pose, line: Polyline, near: float | None = None) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""What of a town is drawn from where: the tiles in sight of a place, and of these the triangles that face the eye."""
+"""The pinhole camera: where a picture is taken from, what of the plane it covers, and where a point lands in it."""
 
 from __future__ import annotations
 
@@ -11,37 +11,47 @@ from numpy.typing import NDArray
 from caldrive.datatypes import CameraConfig, Pose, VehicleState
 from caldrive.geometry import moved
 
+NEAR, FAR = 0.25, 900.0  # m, the clipping planes
+LEVEL = 0.1  # rad of pitch up to which the horizontal angle alone says what a picture covers
+ALL_AROUND = 1e3  # tangent of half an angle that covers everything ahead
+Matrix = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
-class View:
-    """What a camera covers: eye (3,), unit vectors ahead and to the left (2,), tangent of half the view's angle."""
+class Frustum:
+    """What a camera covers, seen from above."""
 
     eye: NDArray[np.float64]
+    """(3,) in m."""
     ahead: NDArray[np.float64]
+    """Unit vector (2,)."""
     left: NDArray[np.float64]
+    """Unit vector (2,)."""
     tangent: float
+    """Of half the horizontal angle."""
 
     def sees(self, at: NDArray[np.floating], reach: NDArray[np.floating] | float) -> NDArray[np.bool_]:
-        """Which circles around points (N, 2) of the plane reach into the view."""
+        """Which circles around points (N, 2) of the plane reach into the view. reach: their radii (N,) or one, m."""
         slope = math.sqrt(1 + self.tangent**2)
         sides = np.stack((self.ahead, self.left)).astype(at.dtype)
         ahead, beside = sides @ at.T - (sides @ self.eye[:2].astype(at.dtype))[:, None]
         return np.asarray((np.abs(beside) - ahead * at.dtype.type(self.tangent) < reach * slope) & (ahead > -reach))
 
 
-NEAR, FAR = 0.25, 900.0  # m
-Matrix = NDArray[np.float64]
-
-
 @dataclass(frozen=True)
-class Lens:
-    """Where a picture is taken from: pose, height (m), pitch (rad, + up), horizontal view (degrees), size (px)."""
+class PinholeCamera:
+    """Where a picture is taken from, and through what."""
 
     pose: Pose
+    """On the plane; the camera looks along its heading."""
     height: float
+    """m above the plane."""
     pitch: float
+    """rad, + up."""
     fov: float
+    """Horizontal field of view, degrees."""
     size: tuple[int, int]
+    """Width and height, pixels."""
 
     @property
     def focal(self) -> float:
@@ -56,17 +66,18 @@ class Lens:
         width, height = self.size
         far = (FAR + NEAR) / (FAR - NEAR)
         rows = np.stack((2 * self.focal / width * right, -2 * self.focal / height * up, far * ahead, ahead))
-        moved_eye = rows @ np.array([self.pose.x, self.pose.y, self.height])
-        return np.column_stack((rows, np.array([0, 0, -2 * FAR * NEAR / (FAR - NEAR), 0]) - moved_eye))
+        shift = rows @ np.array([self.pose.x, self.pose.y, self.height])
+        return np.column_stack((rows, np.array([0, 0, -2 * FAR * NEAR / (FAR - NEAR), 0]) - shift))
 
-    def view(self) -> View:
+    def frustum(self) -> Frustum:
         """What the picture covers on the plane."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
-        wide = math.tan(math.radians(self.fov) / 2) if abs(self.pitch) < 0.1 else 1e3
-        return View(np.array([self.pose.x, self.pose.y, self.height]), np.array([c, s]), np.array([-s, c]), wide)
+        tangent = math.tan(math.radians(self.fov) / 2) if abs(self.pitch) < LEVEL else ALL_AROUND
+        eye = np.array([self.pose.x, self.pose.y, self.height])
+        return Frustum(eye=eye, ahead=np.array([c, s]), left=np.array([-s, c]), tangent=tangent)
 
 
-def mounted(ego: VehicleState, mount: CameraConfig) -> Lens:
-    """The lens of a camera on the ego."""
+def camera_on(ego: VehicleState, mount: CameraConfig) -> PinholeCamera:
+    """The camera that a mount puts on the ego."""
     pose = moved(ego.pose, mount.forward, mount.left, mount.yaw)
-    return Lens(pose, mount.up, 0.0, mount.fov, (mount.width, mount.height))
+    return PinholeCamera(pose, height=mount.up, pitch=0.0, fov=mount.fov, size=(mount.width, mount.height))

@@ -1,0 +1,148 @@
+"""Reads a SUMO network: lanes with their successors, turns and lights, and where posts and signs stand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import sumolib
+
+from caldrive.datatypes import Command, Pose, Sign
+from caldrive.geometry import Polyline, moved, to_local, wrap_angle
+from caldrive.world.roads.network import POST_BESIDE_LANE, Lane, LightPost, RoadNetwork, StopLine
+
+SHORTEST_LANE = 1e-3  # m; shorter ones only join others
+MOST_AHEAD, SIDE = 12.0, (-9.0, -1.0)  # m from a lane's end, ahead and to the left, where its post on a map may stand
+AFTER_LIMIT_CHANGE = 2.0  # m behind which the sign stands
+SIGN_SHARE, SIGN_LEAST = 0.4, 40.0  # where on a street after a junction its sign stands, and how long (m) it must be
+_TURNS = {"l": Command.LEFT, "L": Command.LEFT, "r": Command.RIGHT, "R": Command.RIGHT, "s": Command.STRAIGHT}
+
+
+def read_roads(
+    name: str, network: Path, appearance: str, posts: list[Pose] | None = None, signs: Iterable[Sign] | None = None
+) -> RoadNetwork:
+    """Reads a SUMO network. posts and signs: those of an OpenDRIVE map; None puts them where our towns have them.
+
+    Raises ValueError where it has no lane to drive on.
+    """
+    net = sumolib.net.readNet(str(network), withInternal=True)
+    lanes = _join(net, _read_lanes(net))
+    if not any(not lane.internal for lane in lanes.values()):
+        raise ValueError(f"found no lane of type driving in {name}, wanted one at least: give another map")
+    return RoadNetwork(
+        name=name,
+        network=network,
+        appearance=appearance,
+        lanes=lanes,
+        posts=_read_posts(net, lanes, posts),
+        signs=tuple(signs) if signs is not None else signs_at_limit_changes(lanes),
+    )
+
+
+def _allows_cars(lane: sumolib.net.lane.Lane) -> bool:
+    return bool(lane.allows("passenger"))
+
+
+def _read_lanes(net: sumolib.net.Net) -> dict[str, Lane]:
+    """Lanes for cars by their ids, without what joins them."""
+    lanes: dict[str, Lane] = {}
+    for edge in net.getEdges(withInternal=True):
+        for raw in edge.getLanes():
+            points = np.array(raw.getShape())[:, :2]
+            if not _allows_cars(raw) or np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < SHORTEST_LANE:
+                continue
+            lanes[raw.getID()] = Lane(
+                id=raw.getID(),
+                line=Polyline(points),
+                width=raw.getWidth(),
+                limit=raw.getSpeed() * 3.6,
+                internal=edge.getFunction() == "internal",
+            )
+    return lanes
+
+
+def _is_junction(node: sumolib.net.node.Node) -> bool:
+    """Whether a node is a true junction: cars come in from more than two sides."""
+    incoming = (edge for edge in node.getIncoming() if edge.getFunction() != "internal")
+    return sum(any(map(_allows_cars, edge.getLanes())) for edge in incoming) > 2
+
+
+def _join(net: sumolib.net.Net, lanes: dict[str, Lane]) -> dict[str, Lane]:
+    """Adds successors, turns and lights to bare lanes."""
+    joined = {}
+    turns: dict[str, tuple[Command | None, tuple[str, int] | None]] = {}
+    for lane in lanes.values():
+        onward = [c for c in net.getLane(lane.id).getOutgoing() if c.getToLane().getID() in lanes]
+        successors = tuple(c.getViaLaneID() if c.getViaLaneID() in lanes else c.getToLane().getID() for c in onward)
+        joined[lane.id] = replace(lane, successors=successors)
+        for connection, via in zip(onward, successors, strict=True):
+            if lane.internal:
+                if lanes[via].internal:
+                    turns.setdefault(via, (None, None))
+                continue
+            turn = _TURNS.get(connection.getDirection()) if _is_junction(connection.getJunction()) else None
+            light = (connection.getTLSID(), connection.getTLLinkIndex()) if connection.getTLSID() else None
+            turns[via] = turn, light
+    for via, (turn, light) in turns.items():
+        if joined[via].internal:
+            joined[via] = replace(joined[via], turn=turn, light=light)
+    return joined
+
+
+def stop_line(lane: Lane) -> StopLine:
+    """The two ends (x, y) of the stop line across a lane's end, left end first, m."""
+    end = lane.line.pose_at(lane.line.length)
+    left, right = moved(end, left=lane.width / 2), moved(end, left=-lane.width / 2)
+    return (left.x, left.y), (right.x, right.y)
+
+
+def post_beside(lane: Lane, s: float) -> Pose:
+    """Where a post stands on the right of a lane, s m along it, facing its traffic."""
+    return moved(lane.line.pose_at(s), left=-(lane.width / 2 + POST_BESIDE_LANE))
+
+
+def _read_posts(net: sumolib.net.Net, lanes: dict[str, Lane], on_map: list[Pose] | None) -> tuple[LightPost, ...]:
+    """One post for each approach to a light: at the stop line, or the post on a map that faces it."""
+    posts = []
+    for lane in lanes.values():
+        links = [c for c in net.getLane(lane.id).getOutgoing() if c.getTLSID()]
+        if lane.internal or not links or net.getEdge(links[0].getFrom().getID()).getToNode().getType() == "dead_end":
+            continue
+        pose = post_beside(lane, lane.line.length) if on_map is None else _facing(on_map, lane)
+        if pose is not None:
+            indices = tuple(sorted(c.getTLLinkIndex() for c in links))
+            posts.append(LightPost(links[0].getTLSID(), lane.id, links=indices, pose=pose, stop_line=stop_line(lane)))
+    return tuple(posts)
+
+
+def _facing(posts: list[Pose], lane: Lane) -> Pose | None:
+    """The nearest post at the right of a lane's end that faces its traffic, or None."""
+    end = lane.line.pose_at(lane.line.length)
+    near = []
+    for pose in posts:
+        ahead, left = to_local(end, np.array([pose.x, pose.y]))
+        beside = -MOST_AHEAD < ahead < MOST_AHEAD and SIDE[0] < left < SIDE[1]
+        if beside and abs(wrap_angle(pose.heading - end.heading)) < math.pi / 4:
+            near.append((abs(ahead), pose))
+    return min(near, key=lambda pair: pair[0])[1] if near else None
+
+
+def signs_at_limit_changes(lanes: dict[str, Lane]) -> tuple[Sign, ...]:
+    """A sign where the limit changes, and one along each street after a junction."""
+    signs = []
+    before = {successor: lane for lane in lanes.values() for successor in lane.successors}
+    for lane in lanes.values():
+        if lane.internal:
+            continue
+        via = before.get(lane.id)
+        previous = before.get(via.id) if via is not None and via.internal else via
+        limit = round(lane.limit)
+        after_junction = via is None or via.turn is not None
+        if previous is not None and not after_junction and round(previous.limit) != limit:
+            signs.append(Sign(post_beside(lane, AFTER_LIMIT_CHANGE), limit))
+        elif after_junction and lane.line.length > SIGN_LEAST:
+            signs.append(Sign(post_beside(lane, lane.line.length * SIGN_SHARE), limit))
+    return tuple(signs)

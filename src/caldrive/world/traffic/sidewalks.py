@@ -1,0 +1,127 @@
+"""Where people walk: closed loops in the middle of the sidewalks, and the crossings from one loop to another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from caldrive.datatypes import Points
+from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
+
+GRAIN = 0.05  # m between two rows of a table of places
+CROSSING_SPACING = 2.0  # m of kerb from one crossing to the next
+SHORTEST_CROSSING, LONGEST_CROSSING = 5.0, 22.0  # m
+SPACE_PER_PERSON = 3.0  # m of sidewalk
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A way straight over the road, from a place on one loop to a place on another or the same."""
+
+    loop: int
+    """Number of the loop where it starts."""
+    s: float
+    """m along that loop."""
+    start: Points
+    """(2,), m."""
+    end: Points
+    """(2,), m."""
+    end_loop: int
+    """Number of the loop where it ends."""
+    end_s: float
+    """m along that loop."""
+
+    def back(self) -> Crossing:
+        """The same way in the other direction."""
+        return Crossing(
+            loop=self.end_loop, s=self.end_s, start=self.end, end=self.start, end_loop=self.loop, end_s=self.s
+        )
+
+
+@dataclass(frozen=True)
+class Sidewalks:
+    """A town's sidewalk loops."""
+
+    crossings: tuple[tuple[Crossing, ...], ...]
+    """Those that start on each loop, ordered by s."""
+    lengths: Floats
+    """Of the loops, m."""
+    table: Floats
+    """x, y, heading every GRAIN metres of all loops, one after the other."""
+    first: NDArray[np.int64]
+    """Each loop's first row in the table."""
+
+    def poses(self, loop: NDArray[np.int64], s: Floats) -> Floats:
+        """x, y, heading (N, 3) of places on loops, by the loops' numbers (N,) and the metres along them (N,)."""
+        return np.asarray(self.table[self.first[loop] + (s / GRAIN).astype(int)])
+
+
+@lru_cache(maxsize=8)
+def find_sidewalks(roads: RoadNetwork) -> Sidewalks:
+    """The sidewalk loops of a town, and every other metre of kerb where one can cross."""
+    middle = roads.roadway.buffer(SIDEWALK_WIDTH / 2)
+    parts = middle.geoms if hasattr(middle, "geoms") else [middle]
+    rings = [ring.simplify(0.02) for part in parts for ring in (part.exterior, *part.interiors)]
+    tables = [_table(np.array(ring.coords)) for ring in rings]
+    shapely.prepare(middle)
+    return Sidewalks(
+        crossings=tuple(_crossings(loop, table, rings, middle) for loop, table in enumerate(tables)),
+        lengths=np.array([ring.length for ring in rings]),
+        table=np.concatenate(tables),
+        first=np.cumsum([0, *(len(table) for table in tables[:-1])]),
+    )
+
+
+def _table(ring: Points) -> Floats:
+    """x, y, heading every GRAIN metres of a closed line."""
+    steps = np.diff(ring, axis=0)
+    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
+    at = np.arange(0.0, s[-1] + GRAIN, GRAIN)
+    turns = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    middles = (s[1:] + s[:-1]) / 2
+    return np.stack([np.interp(at, s, ring[:, 0]), np.interp(at, s, ring[:, 1]), np.interp(at, middles, turns)], axis=1)
+
+
+def _crossings(
+    loop: int, table: Floats, rings: Sequence[shapely.LinearRing], middle: shapely.Geometry
+) -> tuple[Crossing, ...]:
+    """Straight over the road every CROSSING_SPACING metres of a loop: towards the inside of the road area, up to the
+    next loop."""
+    rows = np.arange(int(1.0 / GRAIN), len(table) - int(1.0 / GRAIN), int(CROSSING_SPACING / GRAIN))
+    here, heading = table[rows, :2], table[rows, 2]
+    sideways = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
+    inwards = np.where(shapely.contains_xy(middle, here + 0.3 * sideways)[:, None], sideways, -sideways)
+    reach = np.arange(0.3, LONGEST_CROSSING, 0.5)
+    beams = here[:, None] + reach[:, None] * inwards[:, None]
+    inside = shapely.contains_xy(middle, beams.reshape(-1, 2)).reshape(beams.shape[:2])
+    last = np.argmin(inside, axis=1) - 1  # the first place beyond the far loop, and one back
+    usable = ~inside.all(1) & (reach[last] > SHORTEST_CROSSING)
+    ends = shapely.points(beams[np.arange(len(last)), last][usable])
+    end_loops = np.argmin([shapely.distance(ring, ends) for ring in rings], axis=0)
+    end_s = [rings[k].project(end) for k, end in zip(end_loops, ends, strict=True)]
+    places = [rings[k].interpolate(s).coords[0] for k, s in zip(end_loops, end_s, strict=True)]
+    return tuple(
+        Crossing(loop=loop, s=float(row * GRAIN), start=start, end=end, end_loop=int(k), end_s=float(s))
+        for row, start, end, k, s in zip(
+            rows[usable], here[usable], np.array(places).reshape(-1, 2), end_loops, end_s, strict=True
+        )
+    )
+
+
+def room(roads: RoadNetwork) -> int:
+    """How many people a town's sidewalks hold."""
+    return int(find_sidewalks(roads).lengths.sum() / SPACE_PER_PERSON)
+
+
+def require_room(roads: RoadNetwork, n: int) -> None:
+    """Raises ValueError for more people than there is room for."""
+    if n > room(roads):
+        raise ValueError(
+            f"found {n} people asked for, but {roads.name} has room for {room(roads)}: ask for fewer with --people"
+        )

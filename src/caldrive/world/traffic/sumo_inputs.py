@@ -1,0 +1,61 @@
+"""What SUMO's cars are told of what SUMO does not know: our traffic lights, and our people on the road."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import libsumo
+import numpy as np
+
+from caldrive.datatypes import LightState, PedestrianState, VehicleState
+from caldrive.world.traffic.traffic_lights import Phase, TrafficLights
+
+_LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
+PEOPLE_AHEAD = 30.0  # m ahead of a car's front within which it sees somebody
+COMFORTABLE_BRAKE = 4.0  # m/s²
+STOPPING_GAP = 2.5  # m from somebody to the standing car
+HALF_CORRIDOR, HALF_BONNET = 2.2, 1.2  # m to either side of the car's middle, ahead of it and beside its front
+BESIDE = 1.0  # m ahead of the front up to which somebody stands beside the bonnet
+NOTICE = 1.0  # m/s below the cap from which on a car is told
+
+
+class SumoLights:
+    """Tells the running simulation what some lights show. Links without a post stay green: a map may name lights where
+    no post stands, and nobody would know to wait there."""
+
+    def __init__(self, lights: TrafficLights) -> None:
+        self.lights = lights
+        self._rows: dict[str, list[str]] = {}  # what each link of a light shows
+        self._phases: dict[str, Phase] = {}
+        for name in libsumo.trafficlight.getIDList():
+            self._rows[name] = ["G"] * len(libsumo.trafficlight.getControlledLinks(name))
+            libsumo.trafficlight.setRedYellowGreenState(name, "".join(self._rows[name]))
+        self.update()
+
+    def update(self) -> None:
+        """Passes on what changed since the last time."""
+        for name, junction in self.lights.junctions.items():
+            if self._phases.get(name) is junction.phase:
+                continue
+            self._phases[name] = junction.phase
+            row = self._rows[name]
+            for post, state in zip(junction.posts, junction.states(), strict=True):
+                for link in post.links:
+                    row[link] = _LETTER[state]
+            libsumo.trafficlight.setRedYellowGreenState(name, "".join(row))
+
+
+def speed_caps(cars: Sequence[VehicleState], people: Sequence[PedestrianState]) -> dict[str, float]:
+    """How fast some cars may drive (m/s), by their ids, so that they stop before anybody on the road; those whose speed
+    this changes."""
+    walkers = np.array([(p.pose.x, p.pose.y) for p in people if p.on_road]).reshape(-1, 2)
+    rows = np.array([(c.pose.x, c.pose.y, c.pose.heading, c.length, c.speed) for c in cars]).reshape(-1, 5)
+    d, u, v = walkers[None] - rows[:, None, :2], np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
+    ahead = d[..., 0] * u + d[..., 1] * v - rows[:, 3, None] / 2
+    left = d[..., 1] * u - d[..., 0] * v
+    # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
+    half_width = np.where(ahead > BESIDE, HALF_CORRIDOR, HALF_BONNET)
+    near = (np.abs(left) < half_width) & (ahead > -BESIDE) & (ahead < PEOPLE_AHEAD)
+    gap = np.where(near, np.maximum(ahead - STOPPING_GAP, 0.0), np.inf).min(axis=1, initial=np.inf)
+    allowed = np.sqrt(2 * COMFORTABLE_BRAKE * gap)
+    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < rows[:, 4] + NOTICE).tolist()}
