@@ -68,7 +68,7 @@ class EpisodePlan:
     route: Route
     """The way, with random turns."""
     appearance: int
-    """The look of the town, 0 for its own."""
+    """The number of the town's appearance, 0 for its own."""
     tailgating: bool
     """Whether the driver looks for cars and comes close to them."""
 
