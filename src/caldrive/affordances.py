@@ -31,6 +31,7 @@ class AffordanceSpec:
 
     @property
     def discrete(self) -> bool:
+        """Whether it has classes."""
         return bool(self.classes)
 
     @property

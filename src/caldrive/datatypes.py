@@ -32,12 +32,16 @@ class Command(Enum):
 
 
 class LightState(Enum):
+    """What a traffic light shows."""
+
     GREEN = "green"
     YELLOW = "yellow"
     RED = "red"
 
 
 class ContactKind(Enum):
+    """What the ego can touch."""
+
     OBJECT = "object"
     CAR = "car"
     PERSON = "person"

@@ -107,6 +107,7 @@ class Polyline:
 
     @property
     def length(self) -> float:
+        """In metres."""
         return float(self.s[-1])
 
     def _segment(self, s: float) -> int:

@@ -54,9 +54,14 @@ class MappedWorld(World, Protocol):
     """A world whose map and route are known: for minimaps and places. Its types are those of `world.roads`."""
 
     @property
-    def roads(self) -> Any: ...
+    def roads(self) -> Any:
+        """The map: a `RoadNetwork`."""
+        ...
+
     @property
-    def route(self) -> Any: ...
+    def route(self) -> Any:
+        """The way of this episode: a `Route`."""
+        ...
 
 
 class RecordableWorld(MappedWorld, Protocol):

@@ -23,6 +23,12 @@ def town_json(*arguments: str) -> dict[str, Any]:
     return answer
 
 
+def size(path: str) -> tuple[int, int]:
+    """Width and height of a picture's file, which is closed again."""
+    with Picture.open(path) as picture:
+        return picture.size
+
+
 @pytest.fixture
 def _plain_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     """A contact sheet that needs no camera."""
@@ -37,7 +43,7 @@ def _plain_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_town_writes_its_sheet(tmp_path: Path) -> None:
     answer = town_json("--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
     assert (answer["width"], answer["height"]) == (160, 80)
-    assert Picture.open(answer["sheet"]).size == (160, 80)
+    assert size(answer["sheet"]) == (160, 80)
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["town.png"]
 
 
@@ -50,7 +56,7 @@ def test_town_without_options_writes_the_sheet(tmp_path: Path, monkeypatch: pyte
 
 def test_town_writes_the_plan_alone_where_only_that_is_asked_for(tmp_path: Path) -> None:
     answer = town_json("--town", "town02", "--plan", str(tmp_path / "plan.png"), "--width", "1100")
-    assert (answer["plan_width"], answer["plan_height"]) == Picture.open(answer["plan"]).size
+    assert (answer["plan_width"], answer["plan_height"]) == size(answer["plan"])
     assert answer["plan_width"] == 1100
     assert "sheet" not in answer
     assert [path.name for path in tmp_path.iterdir()] == ["plan.png"]

@@ -1,0 +1,1 @@
+"""Suites of episodes: driven, counted, kept, replayed and reported."""

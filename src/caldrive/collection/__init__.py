@@ -1,0 +1,1 @@
+"""Recordings of what the oracle drives, for training."""

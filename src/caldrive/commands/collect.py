@@ -25,6 +25,7 @@ class Collect(Configurable):
     """Processes that record at the same time."""
 
     def run(self, progress: Progress) -> Answer:
+        """Records what is missing; answers with the counts of labels."""
         from caldrive.checks import require_writable_folder
         from caldrive.collection.collect import collect
         from caldrive.commands.tables import counts_table
@@ -50,6 +51,7 @@ class Data(Output):
     """Folder with the recorded episodes."""
 
     def run(self, progress: Progress) -> Answer:
+        """Checks the recording; answers with what it holds, and 1 where a file is damaged."""
         from caldrive.checks import require_writable_file
         from caldrive.commands.tables import recording_table
         from caldrive.recordings.check import check_recording, draw_histograms

@@ -11,10 +11,13 @@ from caldrive.progress import Progress
 
 @dataclass(frozen=True, kw_only=True)
 class Drive(DriveSettings, Configurable):
+    """Drive episodes, film them, and write down what happened."""
+
     strict: bool = False
     """End with exit code 1 unless every episode reached its goal."""
 
     def run(self, progress: Progress) -> Answer:
+        """Drives; answers with a row for each episode."""
         from caldrive.commands.tables import drive_table
         from caldrive.driving.drive import drive
 
@@ -24,7 +27,10 @@ class Drive(DriveSettings, Configurable):
 
 @dataclass(frozen=True, kw_only=True)
 class Determinism(DeterminismSettings, Configurable):
+    """Drive the same episode in two fresh processes and compare all bytes."""
+
     def run(self, progress: Progress) -> Answer:
+        """Drives twice; answers with the first difference, and 1 where there is one."""
         from caldrive.driving.determinism import check_determinism
 
         found = check_determinism(self, progress)

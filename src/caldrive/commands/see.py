@@ -11,7 +11,10 @@ from caldrive.progress import Progress
 
 @dataclass(frozen=True, kw_only=True)
 class See(SeeSettings, Output):
+    """Let the network look at pictures of your own."""
+
     def run(self, progress: Progress) -> Answer:
+        """Looks at the pictures; answers with where the video and the values are."""
         from caldrive.driving.see import see
 
         report = see(self, progress)

@@ -11,7 +11,10 @@ from caldrive.progress import Progress
 
 @dataclass(frozen=True, kw_only=True)
 class WorldSpeed(WorldSpeedSettings, Output):
+    """Camera steps a second, and where the time goes."""
+
     def run(self, progress: Progress) -> Answer:
+        """Measures; answers with milliseconds for each part of a step."""
         from caldrive.driving.speed import measure_world
 
         speed = measure_world(self, progress)  # times the imports, too: nothing is loaded before it
@@ -22,7 +25,10 @@ class WorldSpeed(WorldSpeedSettings, Output):
 
 @dataclass(frozen=True, kw_only=True)
 class AgentSpeed(AgentSpeedSettings, Output):
+    """Milliseconds from image to control."""
+
     def run(self, progress: Progress) -> Answer:
+        """Measures; answers with the median and the 99th percentile."""
         from caldrive.driving.speed import measure_agent
 
         speed = measure_agent(self, progress)

@@ -14,6 +14,8 @@ SHEET = Path("out/town.png")  # where neither a sheet nor a plan was asked for b
 
 @dataclass(frozen=True, kw_only=True)
 class Town(Output):
+    """Draw a town: a contact sheet, or a plan to choose places from."""
+
     town: str = "town01"
     """town01, town02 or an OpenDRIVE file."""
     sheet: Path | None = None
@@ -27,6 +29,7 @@ class Town(Output):
     """Show the town on the sheet in so many random looks, as recordings have them, instead of the weathers."""
 
     def run(self, progress: Progress) -> Answer:
+        """Draws; answers with where the pictures are."""
         sheet = SHEET if self.sheet is None and self.plan is None else self.sheet
         self._check(sheet)
         values: dict[str, Any] = {"town": self.town}

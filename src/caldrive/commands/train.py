@@ -31,6 +31,7 @@ class Train(Configurable):
     """The network that is trained."""
 
     def run(self, progress: Progress) -> Answer:
+        """Trains; answers with the network's file."""
         from caldrive.checks import require_writable_folder
         from caldrive.perception.training.distributed import keep_freed_memory
         from caldrive.perception.training.folder import TrainingFolder
@@ -67,6 +68,7 @@ class Evaluate(Output):
     """fp32, bf16, int8 or int7; auto is what it drives in."""
 
     def run(self, progress: Progress) -> Answer:
+        """Evaluates; answers with IoU and errors beside the paper's."""
         from caldrive.agents.registry import model_path
         from caldrive.checks import require_writable_file
         from caldrive.commands.tables import evaluation_table

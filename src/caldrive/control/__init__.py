@@ -1,0 +1,1 @@
+"""Affordances to control: the laws, their constants and presets."""

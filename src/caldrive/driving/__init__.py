@@ -1,0 +1,1 @@
+"""The loop and its referee: episodes are driven, judged, traced and filmed."""

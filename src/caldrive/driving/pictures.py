@@ -31,14 +31,22 @@ class SourcePicture:
 
 
 class PictureSource(Protocol):
-    """Pictures in their order. name: for captions; rate: how many a second; count: how many, None where not known."""
+    """Pictures in their order."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """For captions."""
+        ...
+
     @property
-    def rate(self) -> float: ...
+    def rate(self) -> float:
+        """Pictures a second."""
+        ...
+
     @property
-    def count(self) -> int | None: ...
+    def count(self) -> int | None:
+        """How many there are, None where that is not known."""
+        ...
 
     def __iter__(self) -> Iterator[SourcePicture]: ...
 

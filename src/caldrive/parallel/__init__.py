@@ -1,0 +1,1 @@
+"""Work for several processes, on this machine or on a cluster."""

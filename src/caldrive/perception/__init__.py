@@ -1,0 +1,1 @@
+"""Image to affordances: the network, its training, and how it runs at the wheel."""

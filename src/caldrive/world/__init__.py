@@ -1,0 +1,1 @@
+"""The embedded world: roads, traffic, truth, scene and pictures."""

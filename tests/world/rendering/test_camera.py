@@ -207,8 +207,6 @@ def test_every_process_draws_the_same_bytes_whatever_lay_in_memory_before() -> N
     assert len(digests[0].strip()) == 64
 
 
-
-
 def test_a_pixel_is_the_mean_of_what_lies_in_it(camera: CameraRig, approach: VehicleState) -> None:
     small, large = (picture(camera, approach, mount=CameraConfig(200 * k, 88 * k)).astype(float) for k in (1, 8))
     mean = large.reshape(88, 8, 200, 8, 3).mean(axis=(1, 3))

@@ -1,0 +1,1 @@
+"""The report on benchmarks: tables, figures, text and a page."""

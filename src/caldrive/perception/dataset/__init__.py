@@ -1,0 +1,1 @@
+"""Recorded frames as training data: windows, sampling and augmentation."""

@@ -1,0 +1,1 @@
+"""The network: backbone, task blocks, files and calibration."""

@@ -54,6 +54,7 @@ class Backbone(nn.Module):
         return self.n_channels * (height // 32) * (width // 32)
 
     def forward(self, images: Tensor) -> Tensor:
+        """Images (N, 3, H, W) to features (N, F)."""
         return self.maps(images)[-1].flatten(1)
 
     def maps(self, images: Tensor) -> list[Tensor]:

@@ -58,6 +58,7 @@ class NodeGroup(nn.Module):
         self.output = nn.Linear(config.nodes * self.steps, n_outputs)
 
     def forward(self, sequence: Tensor) -> Tensor:
+        """Features (N, length, F) to outputs (N, outputs)."""
         if self.kind in RECURRENT:
             hidden = self.norm(self.layer(sequence)[0][:, -1])  # (N, nodes)
         elif self.kind == "tconv":

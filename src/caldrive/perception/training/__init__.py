@@ -1,0 +1,1 @@
+"""The training run: its stages, its settings, and how it resumes."""

@@ -34,6 +34,7 @@ class SegmentationHead(nn.Module):
         self.head = nn.Conv2d(n_channels, 4 * len(Semantic), 1)
 
     def forward(self, maps: Tensor) -> Tensor:
+        """Maps (N, C, h, w) to logits (N, classes, 2 h, 2 w)."""
         return pixel_shuffle(self.head(maps), 2)
 
 

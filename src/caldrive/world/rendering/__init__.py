@@ -1,0 +1,1 @@
+"""How a town is drawn, on the graphics side."""

@@ -1,0 +1,1 @@
+"""Road networks: lanes, routes, plans and maps."""

@@ -1,0 +1,1 @@
+"""Everybody who moves: the ego, cars, people, lights, and what they touch."""

@@ -1,0 +1,1 @@
+"""What is true: the affordances' labels and the ground under the car."""
