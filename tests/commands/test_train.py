@@ -25,6 +25,9 @@ def test_what_is_collected_can_be_trained_on_and_the_result_drives(tmp_path: Pat
     small = ("--steps", "2", "--batch", "2", "--window", "3", "--save-every", "1")
     second_stage = ("--history-steps", "3", "--history-batch", "8")
     model = run_json("train", "--data", recording, "--out", training, *small, *second_stage)["model"]
+    another = ("--initial", model, "--network.hazard-stop.dilation", "3", "--out", str(tmp_path / "another"))
+    answer = run_json("train", "--data", recording, *another, "--steps", "1", "--batch", "2", "--history-steps", "0")
+    assert answer["new_blocks"] == ["hazard_stop"]
     evaluation = run_json("evaluate", "--data", recording, "--model", model, "--held-out")
     assert 0 < evaluation["frames"] <= 10 * 3  # one of the two episodes
     assert 0 <= evaluation["overall"]["red_light/iou"] <= 1

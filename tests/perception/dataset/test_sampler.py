@@ -5,6 +5,7 @@ import pytest
 
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.dataset.sampler import Sampler
+from caldrive.recordings.writer import EpisodeError
 from tests.perception.data import HEIGHT, WIDTH
 
 SIZE = (HEIGHT, WIDTH)
@@ -44,3 +45,8 @@ def test_half_of_the_windows_may_be_seen_with_another_command(frames: Frames) ->
     assert sampler.alternatives(7, 1000, 0.5).mean() == pytest.approx(0.5, abs=0.06)
     assert (sampler.alternatives(7, 1000, 0.5) == sampler.alternatives(7, 1000, 0.5)).all()
     assert (sampler.alternatives(7, 1000, 0.5) != sampler.alternatives(8, 1000, 0.5)).any()
+
+
+def test_a_window_longer_than_every_stream_is_refused(frames: Frames) -> None:
+    with pytest.raises(EpisodeError, match="type a smaller --window"):
+        Sampler(frames, 21, 0.5, seed=0)

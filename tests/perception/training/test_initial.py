@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from caldrive.perception.network.checkpoint import CheckpointError, load_network
-from caldrive.perception.training.initial import different_blocks
+from caldrive.perception.training.initial import different_blocks, with_initial_weights
 from caldrive.perception.training.train import train
 from tests.perception.data import SHORT, TINY
 
@@ -55,3 +55,16 @@ def test_a_network_remembers_what_it_began_with_also_when_it_is_taken_up_without
     train(begun, folder, tmp_path / "second", TINY, stop=lambda step: step == 4)
     done = train(SHORT, folder, tmp_path / "second", TINY)
     assert load_network(done)[1].training["initial"] == first.name
+
+
+def test_imagenets_weights_are_found_in_the_cache_and_not_looked_for_beside_a_trained_network(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TORCH_HOME", str(tmp_path))
+    with pytest.raises(ValueError, match=r"found no vgg16-\*\.pth"):
+        with_initial_weights(replace(SHORT, imagenet="cache"))
+    assert with_initial_weights(replace(SHORT, imagenet="cache", initial="a.safetensors")).imagenet == "none"
+    weights = tmp_path / "hub" / "checkpoints" / "vgg16-397923af.pth"
+    weights.parent.mkdir(parents=True)
+    weights.touch()
+    assert with_initial_weights(replace(SHORT, imagenet="cache")).imagenet == str(weights)

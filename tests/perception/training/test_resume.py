@@ -25,7 +25,9 @@ def test_a_killed_run_resumes_to_the_same_weights(folder: Path, tmp_path: Path) 
     assert read_tensors(tmp_path / "killed" / "state.safetensors")[1]["step"] == 2
     resumed = train(SHORT, folder, tmp_path / "killed", TINY)
     assert resumed.read_bytes() == whole.read_bytes()
-    rows = [[json.loads(line) for line in (p.parent / "metrics.jsonl").open()] for p in (whole, resumed)]
+    rows = [
+        [json.loads(line) for line in (p.parent / "metrics.jsonl").read_text().splitlines()] for p in (whole, resumed)
+    ]
     assert [r["loss"] for r in rows[0]] == [r["loss"] for r in rows[1]]
     assert [r["step"] for r in rows[1]] == [1, 2, 3, 4, 5, 6]
 
