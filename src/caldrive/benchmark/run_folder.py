@@ -1,17 +1,12 @@
-"""A run's folder: what drove it (run.json), and a line for each episode that is done (results.jsonl).
+"""A run's folder: what drove it (run.json), its episodes' lines (`result_lines`), traces and stills (`artifacts`).
 
-Lines are appended and never changed, so a run that was killed holds all that it had finished. A folder takes results of
-one agent, model, code and precision only. Results that are kept for others may be compressed (results.jsonl.gz).
+A folder takes results of one agent, model, code and precision only.
 """
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
-import os
-import zlib
-from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -20,15 +15,16 @@ from typing import Any, NotRequired, TypedDict
 
 from caldrive.agents.registry import provenance
 from caldrive.agents.settings import AgentSettings
+from caldrive.benchmark.artifacts import read_trace_file, trace_path
+from caldrive.benchmark.result_lines import RESULTS, append_line, drop_damaged, read_lines
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import SUITES, Trial, TrialResult, from_json, suite
-from caldrive.files import json_line, read_json, write_whole
+from caldrive.files import read_json, write_whole
 from caldrive.provenance import code_version, machine_name
 from caldrive.results import result_from_values
 from caldrive.world.roads.towns import TOWNS
 
-RESULTS, RUN = "results.jsonl", "run.json"
-COMPRESSED = RESULTS + ".gz"
+RUN = "run.json"
 
 
 class RunDescription(TypedDict):
@@ -53,14 +49,6 @@ class RunDescription(TypedDict):
     began: str
     machine: str
     workers: int
-
-
-class ResultLine(TypedDict):
-    """What a line of results.jsonl says of an episode. figures: those of `EpisodeMetrics`, by name."""
-
-    key: str
-    result: dict[str, Any]
-    figures: dict[str, int | float | None]
 
 
 @dataclass(frozen=True)
@@ -126,6 +114,7 @@ class RunFolder:
                     f"found in {path} results with {name} {folder.description.get(name)}, wanted {value}: "
                     "give another --out"
                 )
+        drop_damaged(path)
         return folder
 
     @property
@@ -144,8 +133,27 @@ class RunFolder:
         return suite(about["suite"], about["seed"], about["time_limit"])
 
     def lines(self) -> dict[str, dict[str, Any]]:
-        """The lines by trial, as `read_lines`."""
-        return read_lines(self.path)
+        """The sound lines by trial, as `ResultLine`."""
+        return read_lines(self.path).by_trial
+
+    def problems(self) -> list[str]:
+        """What a reader of these results should know: a sentence each on damaged lines, lines that are none of the
+        suite's, changed results, and trials that are not driven yet."""
+        lines, keys = read_lines(self.path), [trial.key for trial in self.trials]
+        problems = [
+            f"{sentence}: type caldrive benchmark as before, and it is driven again" for sentence in lines.damaged
+        ]
+        if foreign := sorted(lines.by_trial.keys() - set(keys)):
+            problems.append(
+                f"{len(foreign)} lines are of no trial of {self.description['suite']}, such as {foreign[0]}"
+            )
+        changed = [key for key, line in lines.by_trial.items() if _changed(self.path, key, line)]
+        if changed:
+            problems.append(f"{len(changed)} lines say something else than their traces, such as {changed[0]}")
+        done = sum(key in lines.by_trial for key in keys)
+        if done < len(keys):
+            problems.append(f"unfinished: {done} of {len(keys)} episodes are driven")
+        return problems
 
     def missing(self) -> list[Trial]:
         """The trials that are not driven yet."""
@@ -167,7 +175,13 @@ class RunFolder:
                 )
         for name, content in record.files.items():
             write_whole(self.path / name, content)
-        _append(self.path / RESULTS, record.line)
+        append_line(self.path, record.line)
+
+
+def _changed(folder: Path, key: str, line: dict[str, Any]) -> bool:
+    """Whether a line was edited: its trace, where it is still there, holds the result, too."""
+    path = trace_path(folder, key)
+    return path.is_file() and read_trace_file(path).get("result") != line["result"]
 
 
 def trial_result(trial: Trial, line: dict[str, Any]) -> TrialResult:
@@ -202,41 +216,3 @@ def _require_same_suite(path: Path, digest: str) -> None:
             f"found that {path} or a map in it is not what was driven ({now}), wanted "
             f"{digest}: put it back, or type caldrive benchmark --out ANOTHER"
         )
-
-
-def read_lines(folder: Path) -> dict[str, dict[str, Any]]:
-    """The lines of a folder's results by trial, compressed or not. One that was being written when the run was killed
-    does not count. Raises ValueError for a damaged one."""
-    path = folder / RESULTS
-    try:
-        if not path.is_file() and (folder / COMPRESSED).is_file():
-            path = folder / COMPRESSED
-            text = gzip.decompress(path.read_bytes())
-        else:
-            text = path.read_bytes() if path.is_file() else b""
-        lines = [_read_line(line) for line in text.split(b"\n")[:-1]]
-        if twice := [key for key, n in Counter(line["key"] for line in lines).items() if n > 1]:
-            raise ValueError(f"{twice[0]} is there twice")
-        return {line["key"]: line for line in lines}
-    except (ValueError, EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise ValueError(f"found a damaged line in {path} ({error}), wanted results: give another --out") from error
-
-
-def _read_line(text: bytes) -> dict[str, Any]:
-    """One line, as a `ResultLine`. Raises ValueError for anything else."""
-    line = read_json(text, ResultLine)
-    result_from_values(line["result"])
-    for name, value in line["figures"].items():
-        if value is None and "/" not in name:  # of affordances nothing is known where nothing was seen
-            raise ValueError(f"{name} is no number")
-    return dict(line)
-
-
-def _append(path: Path, values: dict[str, Any]) -> None:
-    """One more line, on the disk when this returns. Cuts off the rest of a line that was broken off."""
-    with path.open("ab+") as file:
-        file.seek(0)
-        file.truncate(file.read().rfind(b"\n") + 1)
-        file.write(json_line(values))
-        file.flush()
-        os.fsync(file.fileno())
