@@ -12,7 +12,7 @@ from caldrive.benchmark.artifacts import still_paths
 from caldrive.benchmark.metrics import succeeded
 from caldrive.benchmark.report.figures import errors_figure, map_figure, speed_figure, success_figure
 from caldrive.benchmark.report.runs import BenchmarkRun, Failure, failures
-from caldrive.benchmark.report.tables import Table, tables
+from caldrive.benchmark.report.tables import Table, headline, tables
 
 _DATA = Path(__file__).parent
 MAX_STILLS = 120  # on one page; beyond that it would be long to open and large to keep
@@ -30,7 +30,8 @@ def report_page(runs: Sequence[BenchmarkRun]) -> str:
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>caldrive benchmark</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{style}</style></head><body><main><h1>Benchmark</h1>{''.join(body)}</main>"
+        f"<style>{style}</style></head><body><main><h1>Benchmark</h1>"
+        f'<p class="headline">{escape(headline(runs))}</p>{"".join(body)}</main>'
         f"<script>{script}</script></body></html>\n"
     )
 
@@ -48,7 +49,7 @@ def _figures(runs: Sequence[BenchmarkRun]) -> list[str]:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in table.head)
+    head = "".join(f'<th><button type="button">{escape(name)}</button></th>' for name in table.head)
     rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
     return (
         f"<section><h2>{escape(table.title)}</h2><p>{escape(table.text)}</p>"
@@ -129,7 +130,7 @@ def _data_address(path: Path) -> str:
 
 def report_text(runs: Sequence[BenchmarkRun]) -> str:
     """The report as Markdown."""
-    parts, failed = ["# Benchmark", ""], failures(runs)
+    parts, failed = ["# Benchmark", "", headline(runs), ""], failures(runs)
     for table in tables(runs):
         parts += [f"## {table.title}", "", table.text, "", *_markdown_table(table.head, table.rows), ""]
     parts += ["## Failures", "", f"{len(failed)} episodes missed their goal or broke a rule.", ""]

@@ -38,6 +38,8 @@ class BenchmarkRun:
     """What its run.json says, a `RunDescription`."""
     results: tuple[TrialResult, ...]
     """Its episodes, in the suite's order."""
+    problems: tuple[str, ...] = ()
+    """What a reader should know: unfinished, edited or damaged, a sentence each."""
 
     def of_condition(self, condition: str) -> list[TrialResult]:
         """The episodes of one condition."""
@@ -95,7 +97,10 @@ def load_run(path: Path) -> BenchmarkRun:
     if not all("turning" in result.episode.comfort and "reds_obeyed" in result.metrics for result in results):
         raise ValueError(f"found results of an older caldrive in {path}: type caldrive benchmark --out ANOTHER")
     name = short_name(folder.description["agent"])
-    return BenchmarkRun(name=name, folder=path, description=folder.description, results=tuple(results))
+    return BenchmarkRun(
+        name=name, folder=path, description=folder.description, results=tuple(results),
+        problems=tuple(folder.problems()),
+    )  # fmt: skip
 
 
 def load_runs(folders: Sequence[Path]) -> list[BenchmarkRun]:

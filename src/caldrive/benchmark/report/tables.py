@@ -8,7 +8,15 @@ from pathlib import Path
 
 from caldrive.affordances import BY_NAME, AffordanceSpec
 from caldrive.benchmark.failure_causes import common_places
-from caldrive.benchmark.metrics import Cell, cells, infraction_rates, mean_comfort, mean_errors, red_light_counts
+from caldrive.benchmark.metrics import (
+    Cell,
+    cells,
+    infraction_rates,
+    mean_comfort,
+    mean_errors,
+    red_light_counts,
+    succeeded,
+)
 from caldrive.benchmark.published import COMFORT, SYSTEMS, km_between, success
 from caldrive.benchmark.report.runs import BenchmarkRun, conditions
 from caldrive.benchmark.suites import TrialResult
@@ -38,7 +46,26 @@ def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
     others = [
         _infractions(runs), _red_lights(runs), _comfort(runs), _affordance_errors(runs), _failure_causes(runs)
     ]  # fmt: skip
-    return [_runs(runs), _success(runs), *(table for table in others if table.rows)]
+    return [_runs(runs), _success(runs), *(table for table in [_problems(runs), *others] if table.rows)]
+
+
+def _problems(runs: Sequence[BenchmarkRun]) -> Table:
+    rows = tuple((run.name, problem) for run in runs for problem in run.problems)
+    return Table(
+        title="Problems", text=f"What is wrong with these results: {len(rows)}.", head=("agent", "what"), rows=rows
+    )
+
+
+def headline(runs: Sequence[BenchmarkRun]) -> str:
+    """The report in a sentence for each run, first of all where something is wrong with it."""
+    sentences = []
+    for run in runs:
+        reached = sum(succeeded(result) for result in run.results)
+        km = sum(result.episode.distance for result in run.results) / 1000
+        faults = sum(infraction.at_fault for result in run.results for infraction in result.episode.infractions)
+        said = f"{run.name}: {reached} of {len(run.results)} goals reached in time, {faults} infractions in {km:.0f} km"
+        sentences.append(f"{said} (see Problems)" if run.problems else said)
+    return "; ".join(sentences) + "."
 
 
 def _runs(runs: Sequence[BenchmarkRun]) -> Table:
