@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
+import shutil
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,7 +16,8 @@ import pytest
 from caldrive.benchmark import run_folder
 from caldrive.benchmark.artifacts import read_trace, trace_path
 from caldrive.benchmark.replay import replay
-from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, read_lines, suite_digest, trial_result
+from caldrive.benchmark.result_lines import read_lines
+from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, suite_digest, trial_result
 from caldrive.benchmark.runner import benchmark
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import suite, to_json
@@ -52,7 +55,7 @@ def test_a_run_broken_off_goes_on_to_the_same_results(whole: BenchmarkSettings, 
     run.close()  # type: ignore[attr-defined]
     with (tmp_path / "results.jsonl").open("ab") as file:  # as if killed while writing
         file.write(b'{"key": "tow')
-    assert len(read_lines(tmp_path)) == 1
+    assert len(read_lines(tmp_path).by_trial) == 1
     assert [step.done for step in benchmark(resumed)] == [2, 3, 4]
     assert lines(resumed) == lines(whole)
     assert RunFolder(resumed.out).results() == RunFolder(whole.out).results()
@@ -136,7 +139,7 @@ def test_a_trial_that_cannot_be_is_named_before_there_is_a_folder(
 
 def test_results_of_another_episode_of_the_same_name_are_refused(whole: BenchmarkSettings) -> None:
     (trial, *_) = suite(whole.suite)
-    line = read_lines(whole.out)[trial.key]
+    line = RunFolder(whole.out).lines()[trial.key]
     other = replace(trial, scenario=replace(trial.scenario, seed=9))
     assert trial_result(trial, line).trial is trial
     with pytest.raises(ValueError, match="another episode when it was driven"):
@@ -152,14 +155,38 @@ def test_what_a_suite_does_not_take_claims_no_folder(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "line", ["nonsense", "3", '{"key": "a"}', '{"key": "a", "result": 3, "figures": {}}', '{"key": NaN}'], ids=str
-)
-def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: Path) -> None:
+DAMAGED = ["nonsense", "3", '{"key": "a"}', '{"key": "a", "result": 3, "figures": {}}', '{"key": NaN}']
+
+
+@pytest.mark.parametrize("line", DAMAGED, ids=str)
+def test_a_damaged_line_is_named_and_costs_its_own_episode_only(
+    line: str, whole: BenchmarkSettings, tmp_path: Path
+) -> None:
     (tmp_path / "run.json").write_bytes((whole.out / "run.json").read_bytes())
-    (tmp_path / "results.jsonl").write_text(line + "\n")
-    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
-        next(benchmark(replace(whole, out=tmp_path)))
+    sound = (whole.out / "results.jsonl").read_text().splitlines()
+    (tmp_path / "results.jsonl").write_text("\n".join([sound[0], line, *sound[2:]]) + "\n")
+    problems = RunFolder(tmp_path).problems()
+    assert len(problems) == 2
+    assert "line 2 of" in problems[0]
+    assert "driven again" in problems[0]
+    assert problems[1] == "unfinished: 3 of 4 episodes are driven"
+    again = replace(whole, out=tmp_path)
+    assert [state.done for state in benchmark(again)] == [4]
+    assert lines(again) == lines(whole)
+    assert RunFolder(tmp_path).problems() == []
+
+
+def test_a_reader_is_told_of_foreign_lines_and_edited_results(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    shutil.copytree(whole.out, tmp_path / "run")
+    assert RunFolder(tmp_path / "run").problems() == []
+    path = tmp_path / "run" / "results.jsonl"
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    rows[0]["result"]["distance"] += 100.0
+    path.write_text("".join(json.dumps(row) + "\n" for row in [*rows, rows[1] | {"key": "of-another-suite"}]))
+    foreign, edited = RunFolder(tmp_path / "run").problems()
+    assert "1 lines are of no trial" in foreign
+    assert "of-another-suite" in foreign
+    assert edited == f"1 lines say something else than their traces, such as {rows[0]['key']}"
 
 
 @pytest.mark.parametrize(
@@ -173,21 +200,22 @@ def test_a_damaged_line_is_named(line: str, whole: BenchmarkSettings, tmp_path: 
 def test_results_that_cannot_be_are_named(change: dict[str, Any], whole: BenchmarkSettings, tmp_path: Path) -> None:
     line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
     (tmp_path / "results.jsonl").write_text(json.dumps(line | {"result": line["result"] | change}) + "\n")
-    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl"):
-        read_lines(tmp_path)
+    found = read_lines(tmp_path)
+    assert found.by_trial == {}
+    assert re.fullmatch(r"line 1 of .*results\.jsonl is damaged \(.+\)", found.damaged[0], re.DOTALL)
 
 
 def test_figures_that_are_no_numbers_are_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
     line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
     (tmp_path / "results.jsonl").write_text(json.dumps(line | {"figures": {"off_lane": None}}) + "\n")
-    with pytest.raises(ValueError, match="off_lane is no number"):
-        read_lines(tmp_path)
+    assert "off_lane is no number" in read_lines(tmp_path).damaged[0]
 
 
-def test_an_episode_that_is_there_twice_is_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+def test_an_episode_that_is_there_twice_counts_once_and_is_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
     (tmp_path / "results.jsonl").write_bytes((whole.out / "results.jsonl").read_bytes() * 2)
-    with pytest.raises(ValueError, match="is there twice"):
-        read_lines(tmp_path)
+    found = read_lines(tmp_path)
+    assert (len(found.by_trial), len(found.damaged)) == (4, 4)
+    assert "is there twice" in found.damaged[0]
 
 
 def test_a_suite_that_has_changed_since_is_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
@@ -255,7 +283,7 @@ def test_a_worker_that_drives_with_something_else_is_refused(name: str, folder: 
 
 
 def test_files_are_there_before_their_line(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_folder, "_append", lambda path, line: pytest.fail("was killed before the line"))
+    monkeypatch.setattr(run_folder, "append_line", lambda path, line: pytest.fail("was killed before the line"))
     with pytest.raises(pytest.fail.Exception):
         folder.save(EpisodeRecord({"key": "a"}, {"traces/a.json.gz": b"x"}, {}))
     assert (folder.path / "traces" / "a.json.gz").read_bytes() == b"x"
@@ -267,5 +295,5 @@ def test_results_that_are_kept_may_be_compressed(whole: BenchmarkSettings, folde
     (folder.path / "results.jsonl.gz").write_bytes(packed_lines)
     assert folder.results() == RunFolder(whole.out).results()
     (folder.path / "results.jsonl.gz").write_bytes(packed_lines[:-20])
-    with pytest.raises(ValueError, match=r"damaged line in .*results\.jsonl\.gz"):
+    with pytest.raises(ValueError, match=r"results\.jsonl\.gz is damaged"):
         folder.lines()

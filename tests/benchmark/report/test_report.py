@@ -235,6 +235,29 @@ def column(page: Any, table: int, head: str) -> list[str]:
     return [row.locator("td").nth(at).inner_text() for row in of_page.locator("tbody tr").all()]
 
 
+def test_problems_of_a_run_stand_in_the_report_and_in_its_headline(tmp_path: Path) -> None:
+    sound, broken = run("cal", tmp_path), replace(run("own", tmp_path), problems=("unfinished: 3 of 32",))
+    assert "Problems" not in report_text([sound])
+    text = report_text([sound, broken])
+    assert "| own | unfinished: 3 of 32 |" in text
+    first = text.splitlines()[2]
+    assert first.startswith("cal: 29 of 32 goals reached in time, 6 infractions in 8 km; own:")
+    assert first.endswith("(see Problems).")
+
+
+def test_the_keyboard_reaches_the_heads_of_tables(page: Any) -> None:
+    head = page.locator("table").nth(1).locator("th button").nth(2)
+    head.focus()
+    page.keyboard.press("Enter")
+    assert head.locator("..").get_attribute("aria-sort") == "ascending"
+
+
+def test_the_papers_columns_are_in_view_at_1280_pixels(page: Any) -> None:
+    page.set_viewport_size({"width": 1280, "height": 800})
+    right = page.locator("table").nth(1).locator("th").last.evaluate("e => e.getBoundingClientRect().right")
+    assert right <= 1280
+
+
 def test_the_page_opens_with_its_tables_plots_and_stills(page: Any) -> None:
     heads = page.locator("h2").all_inner_texts()
     assert {"Runs", "Success", "Infractions", "Driving behaviour", "Speed over distance", "Failures"} <= set(heads)
@@ -249,7 +272,7 @@ def test_nothing_is_fetched_from_outside(page: Any) -> None:
 
 
 def test_a_click_on_a_head_sorts_by_number_and_another_turns_it_round(page: Any) -> None:
-    head = page.locator("table").nth(1).locator("th", has_text=re.compile(r"^CAL \(paper\)"))
+    head = page.locator("table").nth(1).locator("th button", has_text=re.compile(r"^CAL \(paper\)"))
     head.click()
     up = [int(text) for text in column(page, 1, "CAL")]
     assert up == sorted(up)
