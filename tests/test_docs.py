@@ -12,6 +12,8 @@ import pytest
 from PIL import Image as Picture
 
 import caldrive
+from caldrive.benchmark.report.page import report_text
+from caldrive.benchmark.report.runs import load_runs
 from caldrive.benchmark.suites import suite, to_json
 from caldrive.cli import main, parse
 from caldrive.commands import VERBS
@@ -49,6 +51,13 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         Picture.fromarray(image).save(tmp_path / f"picture{k}.png")
     (tmp_path / SHORT_SUITE).write_text(to_json(suite("quick")[:1]))
     return tmp_path
+
+
+def table(report: str, title: str) -> list[str]:
+    """The rows of the table under a title of a report."""
+    rows = [row for row in report.partition(f"\n## {title}\n")[2].partition("\n## ")[0].splitlines() if row[:1] == "|"]
+    assert rows, f"no table {title}"
+    return rows
 
 
 def run(block: Block, folder: Path) -> None:
@@ -117,6 +126,15 @@ def test_every_file_that_a_page_names_is_there(page: Path) -> None:
 def test_every_link_of_the_readme_leads_somewhere() -> None:
     links = re.findall(r"\]\(([^)#]+)\)", (ROOT / "README.md").read_text())
     assert [link for link in links if not (ROOT / link).is_file()] == []
+
+
+@pytest.mark.parametrize("suite_name", ["corl2017", "nocrash", "traffic-school"])
+def test_the_kept_lines_give_the_kept_tables(suite_name: str) -> None:
+    folder = DOCS / "results" / suite_name
+    made = report_text(load_runs((folder / "oracle", folder / "cal")))
+    kept = (folder / "report.md").read_text()
+    for title in ("Success", "Infractions", "Red lights", "Driving behaviour", "Affordances while driving"):
+        assert table(made, title) == table(kept, title)
 
 
 def test_the_map_names_every_folder_of_the_package() -> None:
