@@ -39,8 +39,7 @@ def prepare(folder: Path, call: Callable[[list[str]], int]) -> None:
     folder.mkdir(parents=True)
     from caldrive.benchmark.suites import suite, to_json
 
-    trials = [trial for trial in suite("quick")[4:6]]
-    values = json.loads(to_json(trials))
+    values = json.loads(to_json(suite("quick")[4:6]))
     for row in values:
         row["scenario"]["time_limit"] = 1.0
     (folder / "suite.json").write_text(json.dumps(values))
@@ -145,7 +144,8 @@ def _checkpoints(good: Path, rng: random.Random) -> Attempt:
 def _maps(good: Path, rng: random.Random) -> Attempt:
     files = {"own.xodr": of_text((good / "map.xodr").read_bytes(), rng)}
     verb = rng.choice([
-        (*DRIVE, "--from", "20,-2", "--to", "80,-2"), ("town", "--plan", "{dir}/plan.png"), (*DRIVE, "--task", "straight")
+        (*DRIVE, "--from", "20,-2", "--to", "80,-2"), ("town", "--plan", "{dir}/plan.png"),
+        (*DRIVE, "--task", "straight"),
     ])  # fmt: skip
     return Attempt("map", (*verb, "--town", "{dir}/own.xodr"), files)
 
@@ -195,8 +195,8 @@ CODE = (
     "import sys\nsys.exit()", "class Own:\n act = 5\n step = 6", "def Own(): return None",
 )  # fmt: skip
 MAP = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="4" name="" version="1.0"/>
-<road name="" length="100" id="1" junction="-1"><link/><planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/>
-</geometry></planView><lanes><laneSection s="0">
+<road name="" length="100" id="1" junction="-1"><link/><planView><geometry s="0" x="0" y="0" hdg="0" length="100">
+<line/></geometry></planView><lanes><laneSection s="0">
 <left><lane id="1" type="driving" level="false"><link/><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></left>
 <center><lane id="0" type="none" level="false"/></center>
 <right><lane id="-1" type="driving" level="false"><link/><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
@@ -220,7 +220,8 @@ OPTIONS: tuple[tuple[tuple[str, ...], list[str]], ...] = (
      ["--data", "--preset", "--steps", "--rate", "--seed", "--device", "--initial", "--imagenet", "--out"]),
     (("evaluate", "--data", "{good}/recording"), ["--model", "--precision", "--worst", "--data"]),
     (("benchmark", "--suite", "{good}/suite.json", "--agent", "oracle", "--workers", "1", "--out", "{dir}/out"),
-     ["--suite", "--agent", "--cap", "--controller", "--workers", "--seed", "--time-limit", "--known", "--ray", "--out"]),
+     ["--suite", "--agent", "--cap", "--controller", "--workers", "--seed", "--time-limit", "--known", "--ray",
+      "--out"]),
     (("report", "{good}/run", "--out", "{dir}/page"), ["--out"]),
     (("replay", "{good}/run"), ["--out"]),
     (("speed", "world", "--steps", "3", "--cars", "2", "--people", "2"),

@@ -12,7 +12,8 @@ NASTY: tuple[Any, ...] = (
     "/", [], {}, [[]], {"a": {}}, [None] * 3,
 )  # fmt: skip
 WORDS = ("", "-1", "0", "nan", "inf", "-inf", "1e309", "99999999999999999999", "x" * 3000, "💥", "../..", "/", "a b",
-         "1,2,3,4", "True", "[]", "0x10", " ", "%s", "{}", "none", "1.5", "-0", "\n", "/dev/null", "/proc/self/mem")  # fmt: skip
+         "1,2,3,4", "True", "[]", "0x10", " ", "%s", "{}", "none", "1.5", "-0", "\n", "/dev/null", "10000000",
+         "/proc/self/mem")  # fmt: skip
 
 
 def of_bytes(content: bytes, rng: random.Random) -> bytes:
@@ -67,7 +68,7 @@ def _changed(value: Any, rng: random.Random) -> Any:
     if kind < 0.1:
         return value[:key] + value[key + 1 :]
     if kind < 0.2:
-        return value + [part]
+        return [*value, part]
     return [*value[:key], _changed(part, rng), *value[key + 1 :]]
 
 
