@@ -93,6 +93,15 @@ def test_code_that_fails_is_named_with_its_line(file: Path) -> None:
         load_plugin(f"{file.parent / 'bad.py'}:Driver", "--agent")
 
 
+def test_code_that_ends_the_program_is_named_with_its_line(file: Path) -> None:
+    (file.parent / "leaving.py").write_text("import sys\nsys.exit(0)\n")
+    with pytest.raises(ValueError, match=r"leaving\.py cannot be loaded \(SystemExit: 0, leaving\.py line 2\)"):
+        load_plugin(f"{file.parent / 'leaving.py'}:Driver", "--agent")
+    (file.parent / "late.py").write_text("class Driver:\n    def __init__(self):\n        raise SystemExit\n")
+    with pytest.raises(ValueError, match=r"Driver cannot be made \(SystemExit"):
+        load_plugin(f"{file.parent / 'late.py'}:Driver", "--agent").build()
+
+
 def test_names_are_the_same_in_every_folder_and_short_in_tables(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(file.parent)
     assert full_name("own.py:Driver") == f"{file}:Driver"

@@ -29,7 +29,7 @@ class Plugin:
         try:
             taken = inspect.signature(self.make).parameters
             return self.make(**{name: value for name, value in offered.items() if name in taken})
-        except Exception as error:  # it is somebody else's code
+        except (Exception, SystemExit) as error:  # it is somebody else's code
             raise ValueError(f"found that {self.name} cannot be made ({described(error)}): correct its code") from error
 
     def takes(self, name: str) -> bool:
@@ -107,7 +107,7 @@ def _from_file(path: Path, option: str) -> ModuleType:
     sys.path.insert(0, str(path.parent))
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # it is somebody else's code
+    except (Exception, SystemExit) as error:  # it is somebody else's code
         del sys.modules[name]
         raise ValueError(f"found that {path} cannot be loaded ({described(error)}): correct its code") from error
     finally:
@@ -118,7 +118,7 @@ def _from_file(path: Path, option: str) -> ModuleType:
 def _from_module(name: str, option: str) -> ModuleType:
     try:
         return import_module(name)
-    except Exception as error:  # it is somebody else's code
+    except (Exception, SystemExit) as error:  # it is somebody else's code
         raise ValueError(
             f"found no module {name!r} that can be loaded ({described(error)}), wanted one: "
             f"type {option} PACKAGE.MODULE:CLASS or FILE.py:CLASS"

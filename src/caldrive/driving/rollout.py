@@ -66,7 +66,7 @@ def _call(agent: Agent, method: Callable[..., Any], *arguments: Any, at: str) ->
     """What a method of somebody's agent returns. Raises AgentError for any of its errors."""
     try:
         return method(*arguments)
-    except Exception as error:  # it may be anybody's code
+    except (Exception, SystemExit) as error:  # it may be anybody's code, and it does not end the program
         if os.environ.get("CALDRIVE_TRACEBACK"):
             raise
         raise AgentError(f"found that {_name(agent)} failed {at} ({described(error)}): correct its code") from error
