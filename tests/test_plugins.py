@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 
 import pytest
 
 from caldrive import plugins
-from caldrive.plugins import from_entry_point, full_name, load_plugin, short_name
+from caldrive.plugins import find_plugin, full_name, load_plugin, short_name
 
 CODE = """
 from dataclasses import dataclass
@@ -54,13 +54,17 @@ def test_a_class_of_a_module_is_found() -> None:
     assert load_plugin("fractions:Fraction", "--agent").build() == 0
 
 
-def test_what_an_installed_package_offers_is_found_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    entry = EntryPoint("half", "fractions:Fraction", "caldrive.agents")
-    monkeypatch.setattr(plugins, "entry_points", lambda group, name: [entry] if name == "half" else [])
-    found = from_entry_point("caldrive.agents", "half")
-    assert found is not None
-    assert found.name == "Fraction"
-    assert from_entry_point("caldrive.agents", "third") is None
+@pytest.mark.parametrize(("kind", "known"), [("agent", "cal"), ("controller", "default"), ("world", "embedded")])
+def test_an_offer_is_found_and_another_name_is_refused_with_all_that_there_are(
+    kind: str, known: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entries = EntryPoints([EntryPoint("half", "fractions:Fraction", f"caldrive.{kind}s")])
+    monkeypatch.setattr(plugins, "entry_points", entries.select)
+    assert find_plugin("half", kind, (known,)).name == "Fraction"
+    with pytest.raises(
+        ValueError, match=rf"found {kind} 'third', wanted one of {known}, half, .*type --{kind} {known}"
+    ):
+        find_plugin("third", kind, (known,))
 
 
 def test_another_text_of_the_file_is_another_source(file: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -13,6 +13,8 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from caldrive.provenance import file_digest
 
 
 @dataclass(frozen=True)
@@ -78,16 +80,22 @@ def load_plugin(text: str, option: str) -> Plugin:
     return Plugin(attribute, make, _digest(module))
 
 
-def from_entry_point(group: str, name: str) -> Plugin | None:
-    """The class that an installed package offers under a name in a group, if any."""
+def find_plugin(name: str, kind: str, known: Sequence[str]) -> Plugin:
+    """What somebody calls by `package.module:Class`, `file.py:Class` or the name that an installed package offers.
+
+    kind: agent, controller or world, for the option and the group of entry points; known: what caldrive has itself, for
+    the error. Raises ValueError where there is no such thing.
+    """
+    option, group = f"--{kind}", f"caldrive.{kind}s"
+    if is_plugin(name):
+        return load_plugin(name, option)
     for entry in entry_points(group=group, name=name):
-        return load_plugin(entry.value, name)
-    return None
-
-
-def offered(group: str) -> list[str]:
-    """Names that installed packages offer in a group."""
-    return sorted(entry.name for entry in entry_points(group=group))
+        return load_plugin(entry.value, option)
+    names = ", ".join([*known, *sorted(entry.name for entry in entry_points(group=group))])
+    raise ValueError(
+        f"found {kind} {name!r}, wanted one of {names}, or your own class: "
+        f"type {option} {known[0]}, or {option} FILE.py:CLASS"
+    )
 
 
 def _from_file(path: Path, option: str) -> ModuleType:
@@ -126,6 +134,5 @@ def _from_module(name: str, option: str) -> ModuleType:
 
 
 def _digest(module: ModuleType) -> str:
-    path = getattr(module, "__file__", None)
-    content = Path(path).read_bytes() if path else module.__name__.encode()
-    return hashlib.sha256(content).hexdigest()[:16]
+    path = getattr(module, "__file__", None)  # none for a module that is built in
+    return file_digest(Path(path)) if path else module.__name__

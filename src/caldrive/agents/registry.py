@@ -17,14 +17,13 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
 from caldrive.datatypes import CameraConfig
 from caldrive.interfaces import Agent, TruthSource
-from caldrive.plugins import Plugin, from_entry_point, is_plugin, load_plugin, offered
+from caldrive.plugins import Plugin, find_plugin
 from caldrive.provenance import file_digest
 
 if TYPE_CHECKING:  # the command line's help waits for neither torch nor SUMO
     from caldrive.agents.cal import CALAgent
 
 SHIPPED_MODEL = Path(__file__).parents[1] / "models" / "cal.safetensors"
-GROUP = "caldrive.agents"
 
 
 @dataclass(frozen=True)
@@ -94,14 +93,7 @@ def agent_entry(name: str) -> AgentEntry:
     """The row of an agent. Raises ValueError for an unknown name, and for a class that cannot be loaded."""
     if name in AGENTS:
         return AGENTS[name]
-    plugin = load_plugin(name, "--agent") if is_plugin(name) else from_entry_point(GROUP, name)
-    if plugin is None:
-        names = ", ".join([*AGENTS, *offered(GROUP)])
-        raise ValueError(
-            f"found agent {name!r}, wanted one of {names}, or your own class: "
-            "type --agent oracle, or --agent FILE.py:CLASS"
-        )
-    return _plugin_entry(plugin)
+    return _plugin_entry(find_plugin(name, "agent", tuple(AGENTS)))
 
 
 def _plugin_entry(plugin: Plugin) -> AgentEntry:

@@ -38,7 +38,7 @@ from caldrive.control.longitudinal import LongitudinalConfig
 from caldrive.control.patience import PatienceConfig
 from caldrive.control.pid import PIDGains
 from caldrive.interfaces import Controller
-from caldrive.plugins import Plugin, from_entry_point, is_plugin, load_plugin, offered
+from caldrive.plugins import find_plugin
 from caldrive.provenance import file_digest
 
 DEFAULT = ControlConfig()
@@ -66,7 +66,7 @@ PAPER = ControlConfig(
 )
 
 PRESETS = {"default": DEFAULT, "paper": PAPER}
-GROUP = "caldrive.controllers"  # of entry points
+KNOWN = (*PRESETS, "a .toml file")
 
 
 def controller_config(name: str, cap: float | None) -> ControlConfig:
@@ -88,7 +88,7 @@ def make_controller(name: str, cap: float | None, dt: float) -> Controller:
     """
     if name in PRESETS or name.endswith(".toml"):
         return CALController(controller_config(name, cap), dt)
-    plugin = _plugin(name)
+    plugin = find_plugin(name, "controller", KNOWN)
     controller: Controller = plugin.build(cap=cap, dt=dt)
     if not callable(getattr(controller, "step", None)):
         raise ValueError(
@@ -98,19 +98,8 @@ def make_controller(name: str, cap: float | None, dt: float) -> Controller:
     return controller
 
 
-def _plugin(name: str) -> Plugin:
-    plugin = load_plugin(name, "--controller") if is_plugin(name) else from_entry_point(GROUP, name)
-    if plugin is None:
-        known = ", ".join([*PRESETS, *offered(GROUP)])
-        raise ValueError(
-            f"found controller {name!r}, wanted one of {known}, a .toml file or your own class: "
-            "type --controller default, or --controller FILE.py:CLASS"
-        )
-    return plugin
-
-
 def controller_source(name: str) -> str | None:
     """A digest of the file that a controller's constants or code come from; None for a preset."""
     if name in PRESETS:
         return None
-    return file_digest(Path(name)) if name.endswith(".toml") else _plugin(name).source
+    return file_digest(Path(name)) if name.endswith(".toml") else find_plugin(name, "controller", KNOWN).source

@@ -8,14 +8,14 @@ from caldrive.agents.registry import agent_entry
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import CameraConfig
 from caldrive.interfaces import Agent, World
-from caldrive.plugins import is_plugin, load_plugin
+from caldrive.plugins import find_plugin
 
 WORLDS = ("embedded",)
 WORLD_METHODS = ("reset", "step", "truth", "close")  # of `interfaces.World`
 
 
 def make_world(name: str = "embedded", camera: CameraConfig | None = None, **more: Any) -> World:
-    """A world by name: `embedded`, or `package.module:Class` or `file.py:Class`, an `interfaces.World`.
+    """A world by name: `embedded`, or an `interfaces.World`: `package.module:Class`, `file.py:Class` or an entry point.
 
     camera: the agent's; None drives without images. more: what only some worlds take, such as a stopwatch. Raises
     ValueError for an unknown name and a class that is no World.
@@ -24,11 +24,7 @@ def make_world(name: str = "embedded", camera: CameraConfig | None = None, **mor
         from caldrive.world.embedded import EmbeddedWorld
 
         return EmbeddedWorld(camera, **more)
-    if not is_plugin(name):
-        raise ValueError(
-            f"found world {name!r}, wanted {', '.join(WORLDS)} or your own class: type --world FILE.py:CLASS"
-        )
-    plugin = load_plugin(name, "--world")
+    plugin = find_plugin(name, "world", WORLDS)
     world: World = plugin.build(camera=camera, **more)
     missing = [method for method in WORLD_METHODS if not callable(getattr(world, method, None))]
     missing += ["dt"] * (getattr(world, "dt", None) is None)
