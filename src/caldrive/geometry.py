@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,29 @@ def to_world(frame: Pose, points: Points) -> Points:
     return np.stack((c * p[..., 0] - s * p[..., 1] + frame.x, s * p[..., 0] + c * p[..., 1] + frame.y), axis=-1)
 
 
+class Posed(Protocol):
+    """Something that stands somewhere."""
+
+    @property
+    def pose(self) -> Pose:
+        """Where, and which way it looks."""
+        ...
+
+
+def positions(things: Iterable[Posed]) -> Points:
+    """Where things stand (N, 2), m."""
+    return np.array([(thing.pose.x, thing.pose.y) for thing in things], dtype=float).reshape(-1, 2)
+
+
+def ahead_and_left(
+    points: Points, at: Points, headings: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """N points (N, 2) seen from M frames, by their origins (M, 2) and headings (M,): ahead of each and to its left
+    (N, M), m."""
+    d, u, v = points[:, None] - at, np.cos(headings), np.sin(headings)
+    return d[..., 0] * u + d[..., 1] * v, d[..., 1] * u - d[..., 0] * v
+
+
 def moved(pose: Pose, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> Pose:
     """The pose after going forward and left (m), then turning (rad), all in its own frame."""
     c, s = math.cos(pose.heading), math.sin(pose.heading)
@@ -56,7 +81,7 @@ def boxes_overlap(first: Points, second: Points) -> bool:
     return True
 
 
-def _points_to_segments(points: Points, starts: Points, ends: Points) -> NDArray[np.float64]:
+def points_to_segments(points: Points, starts: Points, ends: Points) -> NDArray[np.float64]:
     """Distances (N, M) from N points to M segments."""
     along = ends - starts
     t = ((points[:, None] - starts) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12)
@@ -68,8 +93,8 @@ def polygon_distance(first: Points, second: Points) -> float:
     """Shortest distance between two convex polygons in metres, 0 where they overlap."""
     if boxes_overlap(first, second):
         return 0.0
-    from_first = _points_to_segments(first, second, np.roll(second, -1, axis=0))
-    from_second = _points_to_segments(second, first, np.roll(first, -1, axis=0))
+    from_first = points_to_segments(first, second, np.roll(second, -1, axis=0))
+    from_second = points_to_segments(second, first, np.roll(first, -1, axis=0))
     return float(min(from_first.min(), from_second.min()))
 
 
@@ -132,6 +157,10 @@ class Polyline:
         i = self._segment(s)
         (x, y), ahead, heading = self._xy[i], s - self._s[i], self._h[i]
         return Pose(x + ahead * math.cos(heading), y + ahead * math.sin(heading), self.heading_at(s))
+
+    def points_at(self, s: NDArray[np.float64]) -> Points:
+        """The points (N, 2) at some arc lengths (N,); beyond its ends, the ends."""
+        return np.stack([np.interp(s, self.s, self.points[:, k]) for k in (0, 1)], axis=1)
 
     def project(self, x: float, y: float, near: float | None = None, window: float = 15.0) -> Projection:
         """The closest place to a point; with `near`, only within `window` metres of that arc length."""

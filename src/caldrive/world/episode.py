@@ -47,7 +47,7 @@ class Episode:
                 ego=self._ego_box(),
                 lights=self._lights,
             )
-        self.labels = LabelRig(town, route, scenario, vehicle.front_axle)
+        self.labels = LabelRig(town, route, scenario, vehicle.front_axle, self._lights.states())
         self._update(time=0.0, progress=0.0, contacts=())
 
     def step(self, control: Control) -> None:

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from caldrive.datatypes import ContactKind, Points, Sign
-from caldrive.geometry import wrap_angle
+from caldrive.datatypes import ContactKind, Sign
+from caldrive.geometry import positions, wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route
 from caldrive.world.roads.towns import load_roads
@@ -31,7 +31,7 @@ class Obstacles:
             Obstacle(ContactKind.OBJECT, f"{prop.kind}{i}", prop.pose, length=prop.length, width=prop.width)
             for i, prop in enumerate(scenery)
         ]
-        self._at: Points = np.array([(box.pose.x, box.pose.y) for box in self._boxes]).reshape(-1, 2)
+        self._at = positions(self._boxes)
         self._reach = np.array([np.hypot(box.length, box.width) / 2 for box in self._boxes])
 
     def near(self, x: float, y: float) -> list[Obstacle]:
@@ -80,12 +80,13 @@ def load_town(name: str, appearance: int = 0) -> Town:
     Raises ValueError or FileNotFoundError where there is none.
     """
     roads = load_roads(name)
-    scenery = build_scenery(roads, appearance)
+    look, signs = town_appearance(roads.appearance, appearance), town_signs(roads.signs, appearance)
+    scenery = build_scenery(roads, signs, look)
     return Town(
         name=name,
-        appearance=town_appearance(roads.appearance, appearance),
+        appearance=look,
         roads=roads,
-        signs=town_signs(roads.signs, appearance),
+        signs=signs,
         scenery=scenery,
         ground=_ground(roads),
         obstacles=Obstacles(scenery),

@@ -20,7 +20,6 @@ from caldrive.world.scene.domain_randomisation import (
     town_appearance,
     town_signs,
 )
-from caldrive.world.scene.scenery import build_scenery
 from caldrive.world.scene.textures import Tex
 from caldrive.world.scene.town_appearances import TOWN_APPEARANCES
 from caldrive.world.town import load_town
@@ -79,8 +78,8 @@ def test_the_limit_on_a_sign_is_the_one_that_counts(roads: RoadNetwork) -> None:
 
 def test_distractors_stand_beside_randomised_streets_only(roads: RoadNetwork) -> None:
     kinds = {"distractor", "shed"}
-    assert not kinds & {prop.kind for town in TOWN_APPEARANCES for prop in build_scenery(load_roads(town))}
-    props = [prop for prop in build_scenery(roads, 4) if prop.kind in kinds]
+    assert not kinds & {prop.kind for town in TOWN_APPEARANCES for prop in load_town(town).scenery}
+    props = [prop for prop in load_town("town01", 4).scenery if prop.kind in kinds]
     assert {prop.kind for prop in props} == kinds
     assert len({(prop.length, prop.width, prop.height) for prop in props}) == 5
     shapely.prepare(roads.roadway)

@@ -8,14 +8,15 @@ import shapely
 
 from caldrive.geometry import box_corners
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.scenery import CLEAR_OF_POSTS, Prop, build_scenery
+from caldrive.world.scene.town_appearances import TOWN_APPEARANCES
+from caldrive.world.town import load_town
 
 
 @pytest.fixture(scope="module", params=("town01", "town02"))
 def town(request: pytest.FixtureRequest) -> tuple[RoadNetwork, tuple[Prop, ...]]:
-    roads = load_roads(request.param)
-    return roads, build_scenery(roads)
+    town = load_town(request.param)
+    return town.roads, town.scenery
 
 
 def footprints(props: tuple[Prop, ...], kind: str) -> np.ndarray:
@@ -23,7 +24,9 @@ def footprints(props: tuple[Prop, ...], kind: str) -> np.ndarray:
 
 
 def test_the_same_town_gets_the_same_scenery(town: tuple[RoadNetwork, tuple[Prop, ...]]) -> None:
-    assert build_scenery(town[0]) == town[1]
+    roads = town[0]
+    again = build_scenery(roads, roads.signs, TOWN_APPEARANCES[roads.appearance])
+    assert again == town[1]
 
 
 def test_buildings_stand_a_metre_behind_the_sidewalk(town: tuple[RoadNetwork, tuple[Prop, ...]]) -> None:

@@ -44,27 +44,38 @@ def vertex_array(
     return gl_context().vertex_array(program, buffers, index_buffer=index, index_element_size=4)
 
 
+class _Arrays:
+    """One mesh for the programs of its kind: that of the colours and, once it is asked for, that of the classes."""
+
+    def __init__(self, kind: str, *buffers: moderngl.Buffer) -> None:
+        self._kind, self._buffers = kind, buffers
+        self._colors = self._of(programs())
+
+    def _of(self, owner: Programs | SemanticPrograms) -> moderngl.VertexArray:
+        return vertex_array(getattr(owner, self._kind), *self._buffers)
+
+    @cached_property
+    def _classes(self) -> moderngl.VertexArray:
+        return self._of(semantic_programs())
+
+    def render(self, semantic: bool, *, vertices: int = -1, instances: int = -1) -> None:
+        """Draws so many vertices or instances; semantic: classes instead of colours."""
+        (self._classes if semantic else self._colors).render(vertices=vertices, instances=instances)
+
+
 class TownMesh:
     """A part of a town, of whose triangles each picture draws those in view. kind: the name of its programs."""
 
     def __init__(self, grid: TileGrid, kind: str) -> None:
         gl = gl_context()
-        self.grid, self.kind = grid, kind
+        self.grid = grid
         self._index = gl.buffer(reserve=max(4, grid.faces.triangles.nbytes), dynamic=True)
-        self._data = gl.buffer(np.ascontiguousarray(grid.vertices).tobytes())
-        self._colors = self._array(programs())
-
-    def _array(self, owner: Programs | SemanticPrograms) -> moderngl.VertexArray:
-        return vertex_array(getattr(owner, self.kind), self._data, self._index)
-
-    @cached_property
-    def _classes(self) -> moderngl.VertexArray:
-        return self._array(semantic_programs())
+        self._arrays = _Arrays(kind, gl.buffer(np.ascontiguousarray(grid.vertices).tobytes()), self._index)
 
     def draw(self, triangles: Triangles, semantic: bool = False) -> None:
         """Draws some triangles (N, 3) of the grid; semantic: classes instead of colours."""
         self._index.write(triangles)
-        (self._classes if semantic else self._colors).render(vertices=triangles.size)
+        self._arrays.render(semantic, vertices=triangles.size)
 
 
 class InstancedMesh:
@@ -73,22 +84,15 @@ class InstancedMesh:
     def __init__(self, mesh: Mesh) -> None:
         gl = gl_context()
         self._instances = gl.buffer(reserve=MOST_INSTANCES * INSTANCE.itemsize, dynamic=True)
-        self._data, self._index = gl.buffer(mesh.vertices.tobytes()), gl.buffer(mesh.triangles.tobytes())
-        self._colors = self._array(programs())
-
-    def _array(self, owner: Programs | SemanticPrograms) -> moderngl.VertexArray:
-        return vertex_array(owner.actor, self._data, self._index, self._instances)
-
-    @cached_property
-    def _classes(self) -> moderngl.VertexArray:
-        return self._array(semantic_programs())
+        data, index = gl.buffer(mesh.vertices.tobytes()), gl.buffer(mesh.triangles.tobytes())
+        self._arrays = _Arrays("actor", data, index, self._instances)
 
     def draw(self, instances: Instances, semantic: bool = False) -> None:
         """Draws the first MOST_INSTANCES of some instances (N,); semantic: classes instead of colours."""
         n = min(len(instances), MOST_INSTANCES)
         if n:
             self._instances.write(np.ascontiguousarray(instances[:n]))
-            (self._classes if semantic else self._colors).render(instances=n)
+            self._arrays.render(semantic, instances=n)
 
 
 def town_meshes(roads: RoadNetwork, scenery: Sequence[Prop], appearance: Appearance) -> tuple[TownMesh, TownMesh]:

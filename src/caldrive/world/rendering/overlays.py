@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -30,7 +29,6 @@ STREAK = np.eye(8, dtype=np.float32)[7]  # added to a lamp, gives its streak on 
 Rows = NDArray[np.float32]  # (N, 8)
 
 
-@lru_cache(maxsize=4096)
 def _lamp(post: Pose, state: LightState) -> tuple[float, ...]:
     """Position of a post's lit lamp, the heading of the traffic it faces, its colour, and 0 for a lamp."""
     at = moved(post, forward=LAMP_FACE - 0.03)

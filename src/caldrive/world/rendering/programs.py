@@ -18,7 +18,7 @@ from caldrive.datatypes import Semantic
 from caldrive.world.rendering.gl import gl_context, mipmapped_layers, rain_texture
 from caldrive.world.scene.cars import GLOWING, CarPart
 from caldrive.world.scene.furniture import LAMP_RADIUS
-from caldrive.world.scene.ground import KERB_HEIGHT
+from caldrive.world.scene.ground import JUNCTION_HALF_WIDTH, KERB_HEIGHT, UNITS_PER_METRE
 from caldrive.world.scene.people import HIP_HEIGHT, SHOULDER_HEIGHT, Limb
 from caldrive.world.scene.shadows import TALLEST_SHADOW
 from caldrive.world.scene.streets import Border
@@ -37,6 +37,8 @@ def defines() -> dict[str, float]:
     members = {f"{prefix}_{member.name}": int(member) for prefix, enum in _ENUMS.items() for member in enum}
     return members | {
         "GLOWING": GLOWING,
+        "METRES_PER_COLOR": 255 / UNITS_PER_METRE,
+        "JUNCTION_HALF_WIDTH": JUNCTION_HALF_WIDTH,
         "HIP_HEIGHT": HIP_HEIGHT,
         "SHOULDER_HEIGHT": SHOULDER_HEIGHT,
         "KERB_HEIGHT": KERB_HEIGHT,

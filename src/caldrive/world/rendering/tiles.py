@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from caldrive.datatypes import Points
 from caldrive.world.rendering.occlusion import CELL, Cells
 from caldrive.world.rendering.pinhole import Frustum
-from caldrive.world.scene.meshes import Mesh, Triangles, Vertices
+from caldrive.world.scene.meshes import Mesh, Triangles, Vertices, merge
 
 LARGE = 100.0  # m: larger triangles belong to no tile
 KEPT = 128  # view cells whose triangles are remembered
@@ -92,13 +92,10 @@ class TileGrid:
 
     def __init__(self, parts: Sequence[tuple[Mesh, DetailLevel]]) -> None:
         parts = [(mesh, level) for mesh, level in parts if len(mesh.triangles)]
-        offsets = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in parts[:-1])])
-        self.vertices = np.concatenate([mesh.vertices for mesh, _ in parts])
-        triangles = [mesh.triangles + np.uint32(offset) for (mesh, _), offset in zip(parts, offsets, strict=True)]
-        faces = _faces(self.vertices, np.concatenate(triangles))
-        level = np.concatenate([np.full(len(mesh.triangles), level) for mesh, level in parts])
-        places = np.concatenate([mesh.places() for mesh, _ in parts])
-        keys = np.column_stack((level, np.floor(places / CELL).astype(int)))  # level and cell of each triangle
+        whole = merge(mesh for mesh, _ in parts)
+        self.vertices, faces = whole.vertices, _faces(whole.vertices, whole.triangles)
+        level = np.repeat([level for _, level in parts], [len(mesh.triangles) for mesh, _ in parts])
+        keys = np.column_stack((level, np.floor(whole.places() / CELL).astype(int)))  # level and cell of each triangle
         keys[faces.reach > LARGE] = NO_TILE, 0, 0
         self.tiles, tile_of = np.unique(keys, axis=0, return_inverse=True)
         order = np.argsort(tile_of, kind="stable")

@@ -81,20 +81,18 @@ class RoadNetwork:
     signs: tuple[Sign, ...]
 
     @cached_property
-    def roadway(self) -> shapely.MultiPolygon:
-        """The asphalt: all driving lanes and the junctions, as a valid (multi)polygon."""
+    def roadway(self) -> shapely.Geometry:
+        """The asphalt: all driving lanes and the junctions, as a valid polygon or several."""
         strips = [
             shapely.LineString(lane.line.points).buffer(lane.width / 2 + 0.01, cap_style="flat")
             for lane in self.lanes.values()
         ]
-        whole = shapely.union_all(strips).buffer(1.5).buffer(-1.5)  # closes the gaps between the lanes of a junction
-        return shapely.MultiPolygon([whole]) if whole.geom_type == "Polygon" else whole
+        return shapely.union_all(strips).buffer(1.5).buffer(-1.5)  # closes the gaps between the lanes of a junction
 
     @cached_property
-    def sidewalk(self) -> shapely.MultiPolygon:
+    def sidewalk(self) -> shapely.Geometry:
         """What pedestrians walk on: a strip along every kerb."""
-        strip = self.roadway.buffer(SIDEWALK_WIDTH).difference(self.roadway)
-        return shapely.MultiPolygon([strip]) if strip.geom_type == "Polygon" else strip
+        return self.roadway.buffer(SIDEWALK_WIDTH).difference(self.roadway)
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -143,6 +141,16 @@ class RoadNetwork:
     def nearest_heading(self, x: float, y: float) -> float:
         """The heading of the lane that runs nearest to a place, rad."""
         return self._closest(x, y)[1].heading
+
+
+def lane_area(line: Polyline, width: float) -> shapely.Polygon:
+    """What a lane of some width (m) covers, by its middle."""
+    return shapely.LineString(line.points).buffer(width / 2, cap_style="flat")
+
+
+def rings(area: shapely.Geometry) -> list[shapely.LinearRing]:
+    """All borders of a polygon or of several, outer and inner."""
+    return [ring for part in shapely.get_parts(area) for ring in (part.exterior, *part.interiors)]
 
 
 def _degrees(pose: Pose) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import tempfile
 from functools import lru_cache
 from pathlib import Path
 
+from caldrive.provenance import file_digest
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.sumo_reader import read_roads
 
@@ -48,7 +48,7 @@ def _load_opendrive(path: Path) -> RoadNetwork:
     from caldrive.world.roads.opendrive import read_furniture
 
     posts, signs = read_furniture(path)
-    network = _cache_folder() / f"{path.stem}-{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}.net.xml"
+    network = _cache_folder() / f"{path.stem}-{file_digest(path)}.net.xml"
     if not network.is_file():
         convert_opendrive(path, network)
     return read_roads(path.stem, network, appearance="town01", posts=posts, signs=signs)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
 from caldrive.geometry import Polyline
-from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
+from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork, lane_area, rings
 from caldrive.world.scene.appearance import GroundCover
 from caldrive.world.scene.meshes import VERTEX, Mesh, Surface, merge, mesh_of_quads, packed, quads
 from caldrive.world.scene.streets import Border, LaneChain, lane_chains
@@ -50,7 +50,7 @@ def _resampled(line: Polyline, cuts: tuple[float, ...] = ()) -> tuple[NDArray[np
     s = np.unique(np.round(np.concatenate((line.s, [c for c in cuts if 0.5 < c < line.length - 0.5])), 3))
     pieces = [np.linspace(a, b, math.ceil((b - a) / LONGEST), endpoint=False) for a, b in pairwise(s)]
     at = np.append(np.concatenate(pieces), s[-1])
-    return at, np.stack([np.interp(at, line.s, line.points[:, k]) for k in (0, 1)], axis=1)
+    return at, line.points_at(at)
 
 
 def _strip(chain: LaneChain, dash: float) -> Mesh:
@@ -80,7 +80,7 @@ def _strip(chain: LaneChain, dash: float) -> Mesh:
 
 def _junctions(roads: RoadNetwork, streets: Sequence[LaneChain]) -> Mesh:
     """The asphalt that no strip covers; it reaches a little under the strips, so that no gap shows."""
-    strips = [shapely.LineString(lane.line.points).buffer(lane.width / 2, cap_style="flat") for lane in streets]
+    strips = [lane_area(lane.line, lane.width) for lane in streets]
     left_over = roads.roadway.difference(shapely.union_all(strips).buffer(-0.25)).buffer(-0.02).simplify(0.01)
     parts = [part for part in shapely.get_parts(left_over) if part.area > 0.05]
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.MultiPolygon(parts)))
@@ -117,8 +117,7 @@ def _bands(ring: shapely.LinearRing, lines: Sequence[tuple[float, float]], surfa
 
 def _edges(roads: RoadNetwork, tolerance: float) -> list[shapely.LinearRing]:
     """The roadway's borders, up to a tolerance in m, with the road on their left."""
-    area = shapely.orient_polygons(roads.roadway.simplify(tolerance))
-    return [ring for part in shapely.get_parts(area) for ring in (part.exterior, *part.interiors)]
+    return rings(shapely.orient_polygons(roads.roadway.simplify(tolerance)))
 
 
 def kerb_mesh(roads: RoadNetwork, ground: GroundCover) -> Mesh:

@@ -10,38 +10,27 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
-from caldrive.world.roads.network import RoadNetwork
+from caldrive.geometry import Polyline
+from caldrive.world.roads.network import RoadNetwork, rings
 
 SHORTEST = 20.0  # m; shorter lines go around nothing that anything could stand beside
 Floats = NDArray[np.float64]
 Shapes = NDArray[np.object_]  # of shapely's
 
 
-class KerbLine:
-    """A closed line at a fixed distance from the roadway, walked with the road on its left."""
-
-    def __init__(self, ring: shapely.LinearRing) -> None:
-        self.points: Points = shapely.get_coordinates(ring)
-        steps = np.diff(self.points, axis=0)
-        self.s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
-        self.length = float(self.s[-1])
-
-    def at(self, s: Floats) -> Points:
-        """The points (N, 2) at some arc lengths (N,), all in m."""
-        return np.stack([np.interp(s, self.s, self.points[:, k]) for k in (0, 1)], axis=1)
-
-    def places(self, s: Floats, reach: Floats) -> tuple[Points, Floats]:
-        """Middles (N, 2) of the chords from s - reach to s + reach, and headings (N,) that look away from the road."""
-        start, end = self.at(np.maximum(s - reach, 0)), self.at(np.minimum(s + reach, self.length))
-        chord = end - start
-        return (start + end) / 2, np.arctan2(-chord[:, 0], chord[:, 1])
+def kerb_lines(roads: RoadNetwork, distance: float) -> list[Polyline]:
+    """The closed lines around a town's roadway and around every block, so many metres beside it, walked with the road
+    on their left."""
+    around = rings(shapely.orient_polygons(roads.roadway.buffer(distance)))
+    return [Polyline(shapely.get_coordinates(ring)) for ring in around if ring.length > SHORTEST]
 
 
-def kerb_lines(roads: RoadNetwork, distance: float) -> list[KerbLine]:
-    """The lines around a town's roadway and around every block, so many metres beside it."""
-    polygons = shapely.get_parts(shapely.orient_polygons(roads.roadway.buffer(distance)))
-    rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
-    return [KerbLine(ring) for ring in rings if ring.length > SHORTEST]
+def chords(line: Polyline, s: Floats, reach: Floats) -> tuple[Points, Floats]:
+    """Middles (N, 2) of the chords of a kerb line from s - reach to s + reach, and headings (N,) that look away from
+    the road."""
+    start, end = line.points_at(np.maximum(s - reach, 0)), line.points_at(np.minimum(s + reach, line.length))
+    chord = end - start
+    return (start + end) / 2, np.arctan2(-chord[:, 0], chord[:, 1])
 
 
 def random_lengths(total: float, least: float, most: float, rng: np.random.Generator) -> Floats:
@@ -58,7 +47,7 @@ def places_along(
     parts = []
     for line in kerb_lines(roads, distance):
         s = np.cumsum(random_lengths(line.length - spacing[0] / 2, *spacing, rng))
-        parts.append(line.places(s, np.full(len(s), 0.4)))
+        parts.append(chords(line, s, np.full(len(s), 0.4)))
     places, outward = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return places, outward
 

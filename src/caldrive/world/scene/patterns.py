@@ -24,7 +24,11 @@ def noise(rng: np.random.Generator, cells: int, size: int = SIZE) -> NDArray[np.
 
 def speckled(color: RGB, rng: np.random.Generator, fine: float, coarse: float, cells: int = 6) -> Layer:
     """A colour with specks of single texels and with waves, by shares of its brightness; cells: see `noise`."""
-    wave = coarse * noise(rng, cells) + fine * rng.uniform(-1, 1, (SIZE, SIZE))
+    return _shaded(color, coarse * noise(rng, cells) + fine * rng.uniform(-1, 1, (SIZE, SIZE)))
+
+
+def _shaded(color: RGB, wave: NDArray[np.float64]) -> Layer:
+    """A colour, each texel brighter by a share (SIZE, SIZE)."""
     return np.clip(np.asarray(color) * (1 + wave[..., None]), 0, 255).astype(np.uint8)
 
 
@@ -52,7 +56,7 @@ def paving(color: RGB, joint: float, rows: int, columns: int, rng: np.random.Gen
 def leaves(color: RGB, rng: np.random.Generator, cells: int) -> Layer:
     """A colour with waves of two sizes: grass or foliage; cells: see `noise`."""
     wave = 0.30 * noise(rng, cells) + 0.22 * noise(rng, 2 * cells) + 0.10 * rng.uniform(-1, 1, (SIZE, SIZE))
-    return np.clip(np.asarray(color) * (1 + wave[..., None]), 0, 255).astype(np.uint8)
+    return _shaded(color, wave)
 
 
 def flipped(picture: Image.Image) -> Layer:

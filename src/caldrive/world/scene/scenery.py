@@ -1,6 +1,7 @@
 """What stands in a town: buildings, trees, posts and street furniture, as a pure function of the road network.
 
-The same town gives the same props in every process: all randomness is seeded from the town's name.
+The same town in the same appearance gets the same props in every process: all randomness is seeded from its name and
+the appearance's number.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from caldrive.datatypes import Points, Pose
+from caldrive.datatypes import Points, Pose, Sign
+from caldrive.geometry import positions
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.scene.appearance import N_BUILDING_TYPES, N_VARIANTS, Appearance, StreetFurniture, StreetLayout
-from caldrive.world.scene.domain_randomisation import town_appearance, town_signs
 from caldrive.world.scene.kerb_lines import (
     Floats,
     beyond,
     box_shapes,
+    chords,
     clear_of,
     kerb_lines,
     places_along,
@@ -68,24 +70,20 @@ _SIZES = {
 SMALL_THINGS = ("bin", "bench", "hydrant", "box")
 
 
-def build_scenery(roads: RoadNetwork, appearance: int = 0) -> tuple[Prop, ...]:
-    """All props of a town: posts first, then buildings, trees and furniture.
-
-    appearance: the number of a random appearance, 0 for the town's own. All have the same streets and posts; other ones
-    have other houses and trees, and other limits on the fast streets.
-    """
-    rng = np.random.default_rng([zlib.crc32(roads.name.encode()), *([appearance] if appearance else [])])
-    parts = town_appearance(roads.appearance, appearance)
-    posts = tuple(_posts(roads, appearance))
-    buildings = tuple(_buildings(roads, parts, rng))
-    trees = tuple(_trees(roads, parts.layout, posts, rng))
-    return (*posts, *buildings, *trees, *_furniture(roads, posts, trees, parts.furniture, rng))
+def build_scenery(roads: RoadNetwork, signs: Sequence[Sign], appearance: Appearance) -> tuple[Prop, ...]:
+    """All props of a town: posts first, then buildings, trees and furniture. signs: as they are in this appearance."""
+    number = appearance.number
+    rng = np.random.default_rng([zlib.crc32(roads.name.encode()), *([number] if number else [])])
+    posts = tuple(_posts(roads, signs))
+    buildings = tuple(_buildings(roads, appearance, rng))
+    trees = tuple(_trees(roads, appearance.layout, posts, rng))
+    return (*posts, *buildings, *trees, *_furniture(roads, posts, trees, appearance.furniture, rng))
 
 
-def _posts(roads: RoadNetwork, appearance: int) -> Iterator[Prop]:
+def _posts(roads: RoadNetwork, signs: Sequence[Sign]) -> Iterator[Prop]:
     for post in roads.posts:
         yield Prop("light_post", post.pose, length=0.2, width=0.2, height=3.5)
-    for sign in town_signs(roads.signs, appearance):
+    for sign in signs:
         yield Prop("sign_post", sign.pose, length=0.2, width=0.2, height=2.5, limit=sign.limit)
 
 
@@ -94,7 +92,7 @@ def _plots(roads: RoadNetwork, layout: StreetLayout, rng: np.random.Generator) -
     parts = []
     for line in kerb_lines(roads, SIDEWALK_WIDTH + SETBACK):
         width = random_lengths(line.length, *layout.frontage, rng)
-        parts.append((*line.places(np.cumsum(width) - width / 2, width / 2), width))
+        parts.append((*chords(line, np.cumsum(width) - width / 2, width / 2), width))
     middles, outward, frontage = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return middles, outward, frontage
 
@@ -154,7 +152,7 @@ def _in_gaps(
 def _trees(roads: RoadNetwork, layout: StreetLayout, posts: Sequence[Prop], rng: np.random.Generator) -> Iterator[Prop]:
     places, outward = places_along(roads, TREE_LINE, layout.tree_spacing, rng)
     heights, variants = rng.uniform(*layout.tree_height, len(places)), rng.integers(3, size=len(places))
-    for i in np.flatnonzero(clear_of(places, _centers(posts), CLEAR_OF_POSTS)):
+    for i in np.flatnonzero(clear_of(places, positions(posts), CLEAR_OF_POSTS)):
         size = (0.4, 0.4, float(heights[i]))
         yield _prop("tree", places[i], outward[i], size, int(variants[i]))
 
@@ -172,7 +170,7 @@ def _furniture(
     for distance, spacing, kinds, clear in rows:
         places, outward = places_along(roads, distance, spacing, rng)
         chosen = rng.integers(len(kinds), size=len(places))
-        free = clear_of(places, _centers(posts), clear) & clear_of(places, _centers(trees), CLEAR_OF_TREES)
+        free = clear_of(places, positions(posts), clear) & clear_of(places, positions(trees), CLEAR_OF_TREES)
         for i in np.flatnonzero(free):
             kind, variant = kinds[chosen[i]], int(rng.integers(N_VARIANTS))
             yield _prop(kind, places[i], outward[i], _size(kind, variant, furniture), variant)
@@ -192,7 +190,3 @@ def _prop(kind: str, place: Points, outward: float, size: tuple[float, float, fl
 
 def _facing_road(place: Points, outward: float) -> Pose:
     return Pose(float(place[0]), float(place[1]), float(outward) + math.pi)
-
-
-def _centers(props: Sequence[Prop]) -> Points:
-    return np.array([(prop.pose.x, prop.pose.y) for prop in props]).reshape(-1, 2)

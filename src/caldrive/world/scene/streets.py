@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from caldrive.geometry import Polyline
+from caldrive.geometry import Polyline, moved, points_to_segments
 from caldrive.world.roads.network import Lane, RoadNetwork
 
 
@@ -100,18 +100,15 @@ class _LaneSegments:
 
     def heading(self, point: NDArray[np.float64], within: float) -> float | None:
         """The heading (rad) of the lane nearest to a point (2,), None where there is none within so many metres."""
-        along = self.ends - self.starts
-        t = ((point - self.starts) * along).sum(1) / np.maximum((along**2).sum(1), 1e-9)
-        gap = np.hypot(*(point - self.starts - np.clip(t, 0, 1)[:, None] * along).T)
+        gap = points_to_segments(point[None], self.starts, self.ends)[0]
         k = int(np.argmin(gap))
         return float(self.headings[k]) if gap[k] < within else None
 
     def border(self, lane: Lane, side: int) -> Border:
         """What parts a lane from whatever lies to its left (side 1) or right (-1)."""
         middle = lane.line.pose_at(lane.line.length / 2)
-        reach = side * (lane.width / 2 + 1.0)
-        point = np.array([middle.x - reach * math.sin(middle.heading), middle.y + reach * math.cos(middle.heading)])
-        beyond = self.heading(point, within=lane.width / 2)
+        beside = moved(middle, left=side * (lane.width / 2 + 1.0))
+        beyond = self.heading(np.array([beside.x, beside.y]), within=lane.width / 2)
         if beyond is None:
             return Border.EDGE
         if math.cos(beyond - middle.heading) < 0:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
+from caldrive.geometry import ahead_and_left, positions
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.traffic.sidewalks import Crossing, Floats, find_sidewalks, require_room
 
@@ -128,11 +129,10 @@ class Pedestrians:
 def may_walk(position: Points, way: Points, pace: Floats, cars: Sequence[VehicleState]) -> NDArray[np.bool_]:
     """Who of N people (N, 2) may walk a stretch (N, 2) at their pace (N,): who enters no corridor of a car that by then
     is beside them or can neither stop nor pass."""
-    at = np.array([(c.pose.x, c.pose.y) for c in cars]).reshape(-1, 2)
     heading, speed, half = np.array([(c.pose.heading, c.speed, c.length / 2) for c in cars]).reshape(-1, 3).T
     u, v = np.cos(heading), np.sin(heading)
-    d = position[:, None] - at
-    ahead, left = d[..., 0] * u + d[..., 1] * v - half, d[..., 1] * u - d[..., 0] * v
+    ahead, left = ahead_and_left(position, positions(cars), heading)
+    ahead -= half
     sideways = way[:, :1] * -v + way[:, 1:] * u  # how far the stretch goes across each car's corridor
     share = np.where(np.abs(sideways) > 1e-6, (np.abs(left) - CORRIDOR) / np.maximum(np.abs(sideways), 1e-6), np.inf)
     entering = (share > 0) & (share <= 1) & (left * sideways < 0)

@@ -11,7 +11,8 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
-from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
+from caldrive.geometry import Polyline
+from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork, rings
 
 GRAIN = 0.05  # m between two rows of a table of places
 CROSSING_SPACING = 2.0  # m of kerb from one crossing to the next
@@ -66,30 +67,26 @@ class Sidewalks:
 def find_sidewalks(roads: RoadNetwork) -> Sidewalks:
     """The sidewalk loops of a town, and every other metre of kerb where one can cross."""
     middle = roads.roadway.buffer(SIDEWALK_WIDTH / 2)
-    parts = middle.geoms if hasattr(middle, "geoms") else [middle]
-    rings = [ring.simplify(0.02) for part in parts for ring in (part.exterior, *part.interiors)]
-    tables = [_table(np.array(ring.coords)) for ring in rings]
+    loops = [ring.simplify(0.02) for ring in rings(middle)]
+    tables = [_table(Polyline(shapely.get_coordinates(ring))) for ring in loops]
     shapely.prepare(middle)
     return Sidewalks(
-        crossings=tuple(_crossings(loop, table, rings, middle) for loop, table in enumerate(tables)),
-        lengths=np.array([ring.length for ring in rings]),
+        crossings=tuple(_crossings(loop, table, loops, middle) for loop, table in enumerate(tables)),
+        lengths=np.array([ring.length for ring in loops]),
         table=np.concatenate(tables),
         first=np.cumsum([0, *(len(table) for table in tables[:-1])]),
     )
 
 
-def _table(ring: Points) -> Floats:
+def _table(ring: Polyline) -> Floats:
     """x, y, heading every GRAIN metres of a closed line."""
-    steps = np.diff(ring, axis=0)
-    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
-    at = np.arange(0.0, s[-1] + GRAIN, GRAIN)
-    turns = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    middles = (s[1:] + s[:-1]) / 2
-    return np.stack([np.interp(at, s, ring[:, 0]), np.interp(at, s, ring[:, 1]), np.interp(at, middles, turns)], axis=1)
+    at = np.arange(0.0, ring.length + GRAIN, GRAIN)
+    middles = (ring.s[1:] + ring.s[:-1]) / 2
+    return np.column_stack((ring.points_at(at), np.interp(at, middles, np.unwrap(ring.headings))))
 
 
 def _crossings(
-    loop: int, table: Floats, rings: Sequence[shapely.LinearRing], middle: shapely.Geometry
+    loop: int, table: Floats, loops: Sequence[shapely.LinearRing], middle: shapely.Geometry
 ) -> tuple[Crossing, ...]:
     """Straight over the road every CROSSING_SPACING metres of a loop: towards the inside of the road area, up to the
     next loop."""
@@ -103,9 +100,9 @@ def _crossings(
     last = np.argmin(inside, axis=1) - 1  # the first place beyond the far loop, and one back
     usable = ~inside.all(1) & (reach[last] > SHORTEST_CROSSING)
     ends = shapely.points(beams[np.arange(len(last)), last][usable])
-    end_loops = np.argmin([shapely.distance(ring, ends) for ring in rings], axis=0)
-    end_s = [rings[k].project(end) for k, end in zip(end_loops, ends, strict=True)]
-    places = [rings[k].interpolate(s).coords[0] for k, s in zip(end_loops, end_s, strict=True)]
+    end_loops = np.argmin([shapely.distance(ring, ends) for ring in loops], axis=0)
+    end_s = [loops[k].project(end) for k, end in zip(end_loops, ends, strict=True)]
+    places = [loops[k].interpolate(s).coords[0] for k, s in zip(end_loops, end_s, strict=True)]
     return tuple(
         Crossing(loop=loop, s=float(row * GRAIN), start=start, end=end, end_loop=int(k), end_s=float(s))
         for row, start, end, k, s in zip(

@@ -8,6 +8,7 @@ import libsumo
 import numpy as np
 
 from caldrive.datatypes import LightState, PedestrianState, VehicleState
+from caldrive.geometry import ahead_and_left, positions
 from caldrive.world.traffic.traffic_lights import Phase, TrafficLights
 
 _LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
@@ -48,14 +49,12 @@ class SumoLights:
 def speed_caps(cars: Sequence[VehicleState], people: Sequence[PedestrianState]) -> dict[str, float]:
     """How fast some cars may drive (m/s), by their ids, so that they stop before anybody on the road; those whose speed
     this changes."""
-    walkers = np.array([(p.pose.x, p.pose.y) for p in people if p.on_road]).reshape(-1, 2)
-    rows = np.array([(c.pose.x, c.pose.y, c.pose.heading, c.length, c.speed) for c in cars]).reshape(-1, 5)
-    d, u, v = walkers[None] - rows[:, None, :2], np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
-    ahead = d[..., 0] * u + d[..., 1] * v - rows[:, 3, None] / 2
-    left = d[..., 1] * u - d[..., 0] * v
+    heading, length, speed = np.array([(c.pose.heading, c.length, c.speed) for c in cars]).reshape(-1, 3).T
+    ahead, left = ahead_and_left(positions(p for p in people if p.on_road), positions(cars), heading)
+    ahead -= length / 2
     # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
     half_width = np.where(ahead > BESIDE, HALF_CORRIDOR, HALF_BONNET)
     near = (np.abs(left) < half_width) & (ahead > -BESIDE) & (ahead < PEOPLE_AHEAD)
-    gap = np.where(near, np.maximum(ahead - STOPPING_GAP, 0.0), np.inf).min(axis=1, initial=np.inf)
+    gap = np.where(near, np.maximum(ahead - STOPPING_GAP, 0.0), np.inf).min(axis=0, initial=np.inf)
     allowed = np.sqrt(2 * COMFORTABLE_BRAKE * gap)
-    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < rows[:, 4] + NOTICE).tolist()}
+    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < speed + NOTICE).tolist()}

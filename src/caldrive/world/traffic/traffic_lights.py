@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
+from caldrive.geometry import ahead_and_left
 from caldrive.world.roads.network import LightPost, RoadNetwork
 
 SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
@@ -85,20 +86,17 @@ class _LoopDetectors:
     def __init__(self, junctions: Iterable[JunctionLights]) -> None:
         groups = [np.array([np.mean(post.stop_line, axis=0) for post in junction.posts]) for junction in junctions]
         self.stops = np.concatenate(groups)
-        headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
-        self.forward = np.stack((np.cos(headings), np.sin(headings)), axis=-1)
+        self.headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
         self.centers = np.array([stops.mean(0) for stops in groups])
         self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
 
     def look(self, poses: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether somebody waits at each post (P,), and whether each junction is occupied (J,); poses: x, y, heading of
         cars (N, 3)."""
-        d = poses[None, :, :2] - self.stops[:, None]
-        u, v = self.forward[:, None, 0], self.forward[:, None, 1]
-        ahead, left = d[..., 0] * u + d[..., 1] * v, d[..., 1] * u - d[..., 0] * v
-        same_way = np.cos(poses[:, 2]) * u + np.sin(poses[:, 2]) * v > 0.7
+        ahead, left = ahead_and_left(poses[:, :2], self.stops, self.headings)
+        same_way = np.cos(poses[:, 2, None] - self.headings) > 0.7
         before_line = (ahead > -LOOP - HALF_CAR) & (ahead < JUST_BEYOND)
-        waiting = (before_line & (np.abs(left) < LOOP_HALF_WIDTH) & same_way).any(1)
+        waiting = (before_line & (np.abs(left) < LOOP_HALF_WIDTH) & same_way).any(0)
         away = np.hypot(*np.moveaxis(poses[None, :, :2] - self.centers[:, None], -1, 0))
         return waiting, (away < self.radii[:, None] - INSIDE).any(1)
 

@@ -12,7 +12,7 @@ from PIL import ImageDraw
 
 from caldrive.datatypes import Pose, VehicleState
 from caldrive.geometry import Polyline, to_world
-from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.network import RoadNetwork, lane_area
 
 CELL = 0.2  # m
 MARGIN = 12.0  # m around the roads
@@ -26,12 +26,10 @@ class GroundRaster:
         x0, y0, x1, y1 = roads.bounds
         self.origin = np.array([x0 - MARGIN, y0 - MARGIN])
         self.shape = (math.ceil((y1 - y0 + 2 * MARGIN) / CELL), math.ceil((x1 - x0 + 2 * MARGIN) / CELL))
-        self.sidewalk = self._draw([(polygon, 1) for polygon in roads.sidewalk.geoms]) == 1
+        self.sidewalk = self._draw([(polygon, 1) for polygon in shapely.get_parts(roads.sidewalk)]) == 1
         self.lines: list[Polyline] = [lane.line for lane in roads.driveable]
-        strips = [
-            shapely.LineString(lane.line.points).buffer(lane.width / 2, cap_style="flat") for lane in roads.driveable
-        ]
-        self.lane = self._draw([(strip, number) for number, strip in enumerate(strips, start=1)])  # 0: none
+        areas = (lane_area(lane.line, lane.width) for lane in roads.driveable)
+        self.lane = self._draw([(area, number) for number, area in enumerate(areas, start=1)])  # 0: none
 
     def _draw(self, polygons: list[tuple[shapely.Polygon, int]]) -> NDArray[np.int32]:
         """A raster (rows, columns) with each polygon's value where it lies, 0 elsewhere; later ones lie on top."""

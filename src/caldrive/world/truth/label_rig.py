@@ -16,12 +16,11 @@ from caldrive.datatypes import (
     PedestrianState,
     Points,
     Pose,
-    Sign,
     TrafficLight,
     Truth,
     VehicleState,
 )
-from caldrive.geometry import moved, to_local
+from caldrive.geometry import moved, positions, to_local
 from caldrive.scenarios import Scenario
 from caldrive.world.roads.route import Route
 from caldrive.world.town import Town
@@ -48,13 +47,17 @@ class WorldState:
 
 
 class LabelRig:
-    """Labels along an episode's route through a town. front_axle: m from the ego's centre to its front axle."""
+    """Labels along an episode's route through a town.
 
-    def __init__(self, town: Town, route: Route, scenario: Scenario, front_axle: float) -> None:
+    front_axle: m from the ego's centre to its front axle. lights: the town's, in the order of every `WorldState`.
+    """
+
+    def __init__(
+        self, town: Town, route: Route, scenario: Scenario, front_axle: float, lights: Sequence[TrafficLight]
+    ) -> None:
         self.town, self.route, self.scenario, self.front_axle = town, route, scenario, front_axle
         self._limits = town.limits_along(route)
-        self._signs_at = _positions(town.signs)
-        self._lights_at: Points | None = None  # lights stay where they are
+        self._signs_at, self._lights_at = positions(town.signs), positions(lights)
 
     @cached_property
     def _forks(self) -> list[Fork]:
@@ -62,8 +65,6 @@ class LabelRig:
 
     def label(self, ego: VehicleState, state: WorldState) -> Affordances:
         """The affordances of a car among all others; ego: where that car is and how fast."""
-        if self._lights_at is None:
-            self._lights_at = _positions(state.lights)
         return label(
             ego,
             self.front_axle,
@@ -104,10 +105,6 @@ class LabelRig:
             goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
             speed_limit=[limit for s, limit in self._limits if s <= state.progress + 0.1][-1],
         )
-
-
-def _positions(posts: Sequence[Sign] | Sequence[TrafficLight]) -> Points:
-    return np.array([(post.pose.x, post.pose.y) for post in posts]).reshape(-1, 2)
 
 
 def _near(here: Pose, positions: Points) -> list[int]:

@@ -25,7 +25,7 @@ from caldrive.datatypes import (
     TrafficLight,
     VehicleState,
 )
-from caldrive.geometry import Polyline, box_corners, moved, polygon_distance, to_local, wrap_angle
+from caldrive.geometry import Polyline, box_corners, moved, polygon_distance, positions, to_local, wrap_angle
 
 IN_VIEW = 5.0  # m from which on a light stands too high to be seen
 REACTION, BRAKE = 0.2, 6.0  # s and m/s²: what stopping before a light takes
@@ -58,13 +58,9 @@ A2 = Area(near=0.0, far=8.2, right=-2.0, left=2.0)
 A3 = Area(near=0.0, far=50.0, right=-1.6, left=1.6)
 
 
-def _positions(objects: Sequence[VehicleState] | Sequence[PedestrianState] | Sequence[Sign]) -> Points:
-    return np.array([(each.pose.x, each.pose.y) for each in objects], dtype=float).reshape(-1, 2)
-
-
 def hazard_stop(axle: Pose, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState]) -> bool:
     """Whether the centre of a car or a person lies in A2. axle: the middle of the ego's front axle."""
-    both = np.concatenate((_positions(vehicles), _positions(pedestrians)))
+    both = np.concatenate((positions(vehicles), positions(pedestrians)))
     return bool(A2.contains(to_local(axle, both)).any())
 
 
@@ -91,7 +87,7 @@ def red_light(axle: Pose, lights: Sequence[TrafficLight], speed: float) -> bool:
 
 def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
     """The limit on the nearest sign in A1 that faces the ego, in km/h."""
-    local = to_local(axle, _positions(signs))
+    local = to_local(axle, positions(signs))
     limits = [
         (x, sign.limit)
         for x, inside, sign in zip(local[:, 0], A1.contains(local), signs, strict=True)
@@ -100,7 +96,7 @@ def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
     return min(limits)[1] if limits else None
 
 
-def in_the_way(vehicle: VehicleState, route: Polyline, near: float | None) -> bool:
+def in_the_way(vehicle: VehicleState, route: Polyline, near: float) -> bool:
     """Whether a car's box reaches into the strip that the ego sweeps along its route.
 
     The areas are straight, and in a turn they sweep over cars that wait in the opposite lane: who stopped for those
@@ -114,7 +110,7 @@ def in_the_way(vehicle: VehicleState, route: Polyline, near: float | None) -> bo
 
 def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleState]) -> float:
     """Shortest distance between the boxes of the ego and the closest car whose centre is in A3, else 50 m."""
-    ahead = np.flatnonzero(A3.contains(to_local(axle, _positions(vehicles))))
+    ahead = np.flatnonzero(A3.contains(to_local(axle, positions(vehicles))))
     own = box_corners(ego.pose, ego.length, ego.width)
     boxes = [box_corners(v.pose, v.length, v.width) for v in (vehicles[int(i)] for i in ahead)]
     return min([*(polygon_distance(own, box) for box in boxes), MAX_VEHICLE_DISTANCE])
@@ -145,7 +141,8 @@ def label(
     """
     axle = moved(ego.pose, forward=front_axle)
     angle, distance, s = to_line(axle, route, near)
-    ahead = A3.contains(to_local(axle, _positions(vehicles))) | A2.contains(to_local(axle, _positions(vehicles)))
+    local = to_local(axle, positions(vehicles))
+    ahead = A3.contains(local) | A2.contains(local)
     vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, s)]
     return Affordances(
         hazard_stop=float(hazard_stop(axle, vehicles, pedestrians)),

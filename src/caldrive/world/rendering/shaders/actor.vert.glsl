@@ -23,7 +23,7 @@ void main() {
     n = vec3(c * n.x - s * n.y, s * n.x + c * n.y, n.z);
     gl_Position = view_projection * vec4(world, 1.0);
     vec3 own = slot == 1 ? first.rgb : slot == 2 ? second.rgb : slot == 3 ? third.rgb : fourth.rgb;
-    vec3 albedo = slot > 0 && slot < 5 ? own * color.rgb : color.rgb;
+    vec3 albedo = slot > 0 && slot < CAR_GLASS ? own * color.rgb : color.rgb;
     bool painted = slot == CAR_PAINT && limb == 0 && fourth.rgb == vec3(0.0);  // people have a fourth colour, cars none
     float gloss = slot == CAR_GLASS ? 0.30 : painted ? 0.12 : 0.0;
     lit = albedo * mix(ground_ambient.rgb, sky_ambient.rgb, 0.5 + 0.5 * n.z);

@@ -8,7 +8,7 @@ float grain(vec2 at) { return texture(layers, vec3(at, float(TEX_ASPHALT))).r; }
 void main() {
     vec3 footprint = max(fwidth(lane), vec3(1e-4));
     float fine = grain(ground * 0.14), coarse = grain(ground.yx * 0.019);
-    float track = clamp(1.0 - 2.2 * abs(abs(lane.x) - 0.85), 0.0, 1.0) * (kinds.z < 4.9 ? 0.09 : 0.0);
+    float track = clamp(1.0 - 2.2 * abs(abs(lane.x) - 0.85), 0.0, 1.0) * (kinds.z < JUNCTION_HALF_WIDTH - 0.1 ? 0.09 : 0.0);
     vec3 albedo = asphalt * fine * (0.45 + 0.7 * coarse) * (1.0 - track);
 
     float wear = 0.55 + 0.5 * fine, left, right, stop;

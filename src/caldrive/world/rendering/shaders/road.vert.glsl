@@ -7,6 +7,6 @@ void main() {
     gl_Position = view_projection * vec4(position, 1.0);
     ground = position.xy;
     lane = uv;
-    kinds = color.rgb * vec3(255.0, 255.0, 5.1);  // left line, right line, half width in m: a byte counts 2 cm
+    kinds = color.rgb * vec3(255.0, 255.0, METRES_PER_COLOR);  // left line, right line, half width in m
     place = vec4((position.xy - shadow_area.xy) * shadow_area.zw, 0.0, 0.0);
 }
