@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 LINE = '<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>'
@@ -20,6 +21,13 @@ def write_map(folder: Path, geometry: str = LINE, signals: str = "", objects: st
         <road name="" length="{length}" id="1" junction="-1"><link/><planView>{geometry}</planView>{LANES}
         <objects>{objects}</objects><signals>{signals}</signals></road></OpenDRIVE>"""
     )
+    return path
+
+
+def write_one_way_map(folder: Path) -> Path:
+    """A map of one road of one lane."""
+    path = write_map(folder)
+    path.write_text(re.sub(r"<left>.*?</left>", "", path.read_text(), flags=re.DOTALL))
     return path
 
 

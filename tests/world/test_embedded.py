@@ -28,6 +28,8 @@ from caldrive.world.rendering.pinhole import camera_on
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
+from caldrive.world.town import load_town
+from caldrive.world.traffic.ego import VehicleConfig
 
 NOTHING = Control()
 
@@ -157,6 +159,18 @@ def test_a_car_that_leaves_the_road_meets_something_solid(world: EmbeddedWorld) 
     hits = [contact for truth in truths for contact in truth.contacts]
     assert ContactKind.OBJECT in {contact.kind for contact in hits}
     assert max(contact.impulse for contact in hits) > 400
+
+
+def test_a_long_vehicle_meets_what_stands_far_from_its_middle() -> None:
+    town = load_town("town02")
+    lane = max(town.roads.driveable, key=lambda lane: lane.line.length).line
+    places = [lane.project(prop.pose.x, prop.pose.y) for prop in town.scenery if prop.kind == "lamp"]
+    lamp = next(place for place in places if -3.5 < place.left < -2.0 and 20 < place.s < lane.length - 30)
+    with closing(EmbeddedWorld(vehicle=VehicleConfig(length=14.0))) as world:
+        world.reset(along_the_street(start=lamp.s - 6.0, goal=lamp.s + 20.0))
+        world.displace(left=lamp.left, turn=0.0)
+        world.step(NOTHING)
+        assert any(contact.id.startswith("lamp") for contact in world.truth().contacts)
 
 
 def test_a_car_across_the_centre_line_is_on_the_opposite_lane(world: EmbeddedWorld) -> None:

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from caldrive.datatypes import DT, Contact, Control, VehicleState
+from caldrive.datatypes import DT, Contact, Control, PedestrianState, VehicleState
 from caldrive.geometry import moved
 from caldrive.scenarios import Scenario
 from caldrive.timing import Timed, untimed
 from caldrive.world.roads.route import Route
 from caldrive.world.town import Town
-from caldrive.world.traffic.collisions import obstacle_of, resolve
+from caldrive.world.traffic.collisions import half_diagonal, obstacle_of, resolve
 from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
 from caldrive.world.traffic.pedestrians import Pedestrians
 from caldrive.world.traffic.traffic_lights import TrafficLights
 from caldrive.world.traffic.vehicles import Traffic
 from caldrive.world.truth.label_rig import LabelRig, WorldState
 
-CONTACT_REACH = 12.0  # m within which cars and people are tested for contact
+ACTOR_REACH = 3.0  # m from the centre of a car or person to its farthest corner, at most
+PUSHED = 2.0  # m that a first contact may move the ego towards another, at most
 
 
 class Episode:
@@ -90,11 +92,12 @@ class Episode:
     def _resolve_contacts(self, before: WorldState) -> tuple[Contact, ...]:
         """Finds contacts, and lets them act on the ego."""
         ego = self._ego_box()
-        x, y = ego.pose.x, ego.pose.y
-        near = self.town.obstacles.near(x, y)
-        for group in (before.vehicles, before.pedestrians):
-            close = [actor for actor in group if abs(actor.pose.x - x) + abs(actor.pose.y - y) < CONTACT_REACH]
-            near += [obstacle_of(actor) for actor in close]
+        here, reach = ego.pose, half_diagonal(ego) + PUSHED
+        near = self.town.obstacles.near(here, reach)
+        actors: tuple[VehicleState | PedestrianState, ...] = (*before.vehicles, *before.pedestrians)
+        for actor in actors:
+            if math.hypot(actor.pose.x - here.x, actor.pose.y - here.y) < reach + ACTOR_REACH:
+                near.append(obstacle_of(actor))
         ego, contacts = resolve(ego, near)
         self._ego = replace(self._ego, pose=ego.pose, speed=ego.speed)
         return contacts

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from caldrive.datatypes import ContactKind, Sign
+from caldrive.datatypes import ContactKind, Pose, Sign
 from caldrive.geometry import positions, wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route
@@ -15,10 +15,9 @@ from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.appearance import Appearance
 from caldrive.world.scene.domain_randomisation import town_appearance, town_signs
 from caldrive.world.scene.scenery import Prop, build_scenery
-from caldrive.world.traffic.collisions import Obstacle
+from caldrive.world.traffic.collisions import Obstacle, half_diagonal
 from caldrive.world.truth.ground_raster import GroundRaster
 
-CLOSE = 4.0  # m from the ego's centre to an obstacle's edge within which a contact is looked for
 SIGN_BESIDE = (-7.0, -1.0)  # m left of the route where a sign that counts for it stands
 SAME_WAY = 0.5  # rad at most between the route and the traffic that such a sign faces
 
@@ -32,12 +31,12 @@ class Obstacles:
             for i, prop in enumerate(scenery)
         ]
         self._at = positions(self._boxes)
-        self._reach = np.array([np.hypot(box.length, box.width) / 2 for box in self._boxes])
+        self._reach = np.array([half_diagonal(box) for box in self._boxes])
 
-    def near(self, x: float, y: float) -> list[Obstacle]:
-        """Those that a car with its centre here (m) may touch."""
-        distance = np.hypot(self._at[:, 0] - x, self._at[:, 1] - y) - self._reach
-        return [self._boxes[i] for i in np.flatnonzero(distance < CLOSE)]
+    def near(self, here: Pose, reach: float) -> list[Obstacle]:
+        """Those that something of this reach (m) around here may touch."""
+        distance = np.hypot(*(self._at - (here.x, here.y)).T) - self._reach
+        return [self._boxes[i] for i in np.flatnonzero(distance < reach)]
 
 
 @dataclass(frozen=True, eq=False)

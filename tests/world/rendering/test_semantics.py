@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,8 @@ from caldrive.geometry import moved
 from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.towns import load_roads
+from caldrive.world.town import load_town
+from tests.maps import write_one_way_map
 
 MOUNT = CameraConfig(400, 176)
 
@@ -52,3 +57,13 @@ def test_looking_at_classes_changes_no_picture(camera: CameraRig, approach: Vehi
     first = camera.render(SceneState(3, approach), [MOUNT])[0]
     camera.render_semantics(SceneState(1, approach), [MOUNT])
     assert (camera.render(SceneState(3, approach), [MOUNT])[0] == first).all()
+
+
+def test_the_edge_lines_of_a_one_way_street_are_equally_wide(tmp_path: Path) -> None:
+    town = load_town(str(write_one_way_map(tmp_path)))
+    ego = VehicleState(town.roads.driveable[0].line.pose_at(20.0))
+    with closing(CameraRig(town)) as camera:
+        lines = camera.render_semantics(SceneState(1, ego), [CameraConfig(800, 352)])[0][200:] == Semantic.LINE
+    left, right = lines[:, :400].sum(axis=1), lines[:, 400:].sum(axis=1)
+    assert right[-1] > 15
+    assert np.abs(left - right).max() <= 1

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from caldrive.datatypes import Command, Pose
-from caldrive.geometry import moved, wrap_angle
+from caldrive.geometry import Polyline, moved, wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import COMMAND_AHEAD, Route, plan_route, random_route
 
@@ -180,3 +180,12 @@ def test_a_random_route_ends_outside_a_junction(town01: RoadNetwork) -> None:
         end = route.line.pose_at(route.length - 0.1)
         assert town01.lane_at(end)[0].id in {name for name, _ in route.lanes}
         assert all(turn.end < route.length for turn in route.turns)
+
+
+def test_a_goal_on_a_lane_that_joins_nothing_cannot_be_reached(town01: RoadNetwork) -> None:
+    start = max(town01.driveable, key=lambda lane: lane.line.length)
+    line = Polyline(np.array([(-900.0, -900.0), (-800.0, -900.0)]))
+    island = replace(start, id="island_0", line=line, successors=())
+    roads = replace(town01, lanes=town01.lanes | {island.id: island})
+    with pytest.raises(ValueError, match=r"found no way from .* to \(-850, -900\)"):
+        plan_route(roads, start.line.pose_at(5.0), line.pose_at(50.0))

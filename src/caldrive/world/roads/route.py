@@ -64,6 +64,7 @@ class Route:
 def _graph(roads: RoadNetwork) -> nx.DiGraph:
     """Lanes as nodes; an edge is as long as the lane that it leaves."""
     graph = nx.DiGraph()
+    graph.add_nodes_from(roads.lanes)  # also those that join no other
     for lane in roads.lanes.values():
         for successor in lane.successors:
             graph.add_edge(lane.id, successor, length=lane.line.length)

@@ -44,6 +44,11 @@ def obstacle_of(actor: VehicleState | PedestrianState) -> Obstacle:
     return Obstacle(ContactKind.PERSON, actor.id, actor.pose, length=size, width=size, speed=actor.speed)
 
 
+def half_diagonal(box: VehicleState | Obstacle) -> float:
+    """m from the centre of a box to its corners."""
+    return math.hypot(box.length, box.width) / 2
+
+
 def _at_fault(ego: VehicleState, touch: Points, obstacle: Obstacle) -> bool:
     """The ego is at fault where its moving front or flank runs into something, not where it is run into."""
     x = float(to_local(ego.pose, touch)[0])
@@ -72,8 +77,8 @@ def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleSt
     slides along."""
     contacts = []
     for obstacle in obstacles:
-        reach = math.hypot(ego.length + obstacle.length, ego.width + obstacle.width) / 2
-        if math.hypot(obstacle.pose.x - ego.pose.x, obstacle.pose.y - ego.pose.y) > reach:
+        apart = math.hypot(obstacle.pose.x - ego.pose.x, obstacle.pose.y - ego.pose.y)
+        if apart > half_diagonal(ego) + half_diagonal(obstacle):
             continue
         shift = push_out(
             moving=box_corners(ego.pose, ego.length, ego.width),

@@ -13,7 +13,7 @@ void stripes(vec3 footprint, out float left, out float right, out float stop) {
     bool edge = kinds.x == float(BORDER_EDGE);
     float broken = kinds.x == float(BORDER_SOLID_CENTER) || edge ? 1.0 : dash;
     float inset = edge ? widths.z : 0.0;
-    left = kinds.x > 0.0 ? broken * stripe(lane.x, footprint.x, kinds.z - inset, widths.x) : 0.0;
+    left = kinds.x > 0.0 ? broken * stripe(lane.x, footprint.x, kinds.z - inset, edge ? widths.y : widths.x) : 0.0;
     right = kinds.y == float(BORDER_EDGE) ? stripe(lane.x, footprint.x, widths.z - kinds.z, widths.y) : 0.0;
     stop = stripe(lane.z, footprint.z, 0.6, 0.25);
 }
