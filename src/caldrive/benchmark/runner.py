@@ -33,7 +33,7 @@ from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
 from caldrive.world.traffic.sidewalks import require_room
-from caldrive.world.traffic.vehicles import free_places
+from caldrive.world.traffic.start_places import free_places
 
 
 @lru_cache(maxsize=1)

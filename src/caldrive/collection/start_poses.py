@@ -19,7 +19,7 @@ from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.roads.route import Route, random_route
 from caldrive.world.scene.domain_randomisation import one_of
 from caldrive.world.town import load_town
-from caldrive.world.traffic.vehicles import room
+from caldrive.world.traffic.start_places import room
 
 BEFORE_SIGN, BEFORE_TURN = (15.0, 45.0), (2.0, 25.0)  # m
 LANE_MARGIN = 3.0  # m kept to the ends of a lane by a start anywhere; shorter lanes than four times this have none

@@ -39,6 +39,7 @@ class Episode:
         self._ego = EgoState(route.line.pose_at(0.0))
         self._lights = TrafficLights(town.roads, lights)
         self._pedestrians = Pedestrians(town.roads, scenario.n_pedestrians, people, scenario.crossing)
+        self.labels = LabelRig(town, route, scenario, vehicle.front_axle, self._lights.states())
         self._traffic: Traffic | None = None
         if scenario.n_vehicles:
             self._traffic = Traffic(
@@ -49,8 +50,11 @@ class Episode:
                 ego=self._ego_box(),
                 lights=self._lights,
             )
-        self.labels = LabelRig(town, route, scenario, vehicle.front_axle, self._lights.states())
-        self._update(time=0.0, progress=0.0, contacts=())
+        try:
+            self._update(time=0.0, progress=0.0, contacts=())
+        except BaseException:
+            self.close()  # nobody else can: there is no episode yet
+            raise
 
     def step(self, control: Control) -> None:
         """Moves everything on by DT."""

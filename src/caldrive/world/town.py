@@ -11,7 +11,7 @@ from caldrive.datatypes import ContactKind, Pose, Sign
 from caldrive.geometry import positions, wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route
-from caldrive.world.roads.towns import load_roads
+from caldrive.world.roads.towns import load_roads, one_sentence
 from caldrive.world.scene.appearance import Appearance
 from caldrive.world.scene.domain_randomisation import town_appearance, town_signs
 from caldrive.world.scene.scenery import Prop, build_scenery
@@ -80,13 +80,14 @@ def load_town(name: str, appearance: int = 0) -> Town:
     """
     roads = load_roads(name)
     look, signs = town_appearance(roads.appearance, appearance), town_signs(roads.signs, appearance)
-    scenery = build_scenery(roads, signs, look)
-    return Town(
-        name=name,
-        appearance=look,
-        roads=roads,
-        signs=signs,
-        scenery=scenery,
-        ground=_ground(roads),
-        obstacles=Obstacles(scenery),
-    )
+    with one_sentence(name):
+        scenery = build_scenery(roads, signs, look)
+        return Town(
+            name=name,
+            appearance=look,
+            roads=roads,
+            signs=signs,
+            scenery=scenery,
+            ground=_ground(roads),
+            obstacles=Obstacles(scenery),
+        )

@@ -8,10 +8,14 @@ from pathlib import Path
 import pytest
 from scipy.special import fresnel
 
-from caldrive.datatypes import Pose
+from caldrive.datatypes import Pose, Sign
 from caldrive.geometry import moved, wrap_angle
-from caldrive.world.roads.opendrive import read_furniture
+from caldrive.world.roads import opendrive
 from tests.maps import sign_at, write_map
+
+
+def read_furniture(path: Path) -> tuple[list[Pose], list[Sign]]:
+    return opendrive.read_furniture(path.read_bytes())
 
 
 def assert_pose(pose: Pose, wanted: Pose) -> None:
@@ -94,29 +98,32 @@ def test_a_sign_stands_on_the_right_piece_of_a_road_of_several(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("", "is no OpenDRIVE map"),
-        ("<OpenDRIVE><road>", "is no OpenDRIVE map"),
-        ("a drawing", "is no OpenDRIVE map"),
-        ("<osm/>", "found <osm> in .*, wanted <OpenDRIVE>"),
+        (b"", "it is no XML: no element found"),
+        (b"<OpenDRIVE><road>", "it is no XML: no element found"),
+        (b"a drawing", "it is no XML: syntax error"),
+        (b"<osm/>", "it is <osm>, not <OpenDRIVE>"),
     ],
     ids=["empty", "cut off", "no xml", "another format"],
 )
-def test_a_file_that_is_no_map_says_so(content: str, message: str, tmp_path: Path) -> None:
-    path = tmp_path / "broken.xodr"
-    path.write_text(content)
+def test_a_file_that_is_no_map_says_so(content: bytes, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        read_furniture(path)
+        opendrive.read_furniture(content)
 
 
-@pytest.mark.parametrize("geometry", ["", '<geometry s="0" x="0" y="0" hdg="0" length="9"/>'], ids=["none", "bare"])
-def test_a_road_without_a_reference_line_says_so(geometry: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="is no OpenDRIVE map"):
+@pytest.mark.parametrize(
+    ("geometry", "message"),
+    [("", "road 1 has no <geometry> at s=5"), ('<geometry s="0" x="0" y="0" hdg="0" length="9"/>', "is no line")],
+    ids=["none", "bare"],
+)
+def test_a_road_without_a_reference_line_has_no_place_for_a_sign(geometry: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=message):
         read_furniture(write_map(tmp_path, geometry, sign_at(5)))
 
 
-def test_a_number_that_is_none_says_so(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="is no OpenDRIVE map"):
-        read_furniture(write_map(tmp_path, signals='<signal s="here" t="-5" type="274" value="30"/>'))
+@pytest.mark.parametrize("s", ["here", "nan", "inf"])
+def test_a_number_that_is_none_says_so(s: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=f"here|s={s}"):
+        read_furniture(write_map(tmp_path, signals=f'<signal id="7" s="{s}" t="-5" type="274" value="30"/>'))
 
 
 def test_a_map_without_roads_has_no_furniture(tmp_path: Path) -> None:

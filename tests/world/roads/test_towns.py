@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from caldrive.datatypes import Pose
 from caldrive.geometry import to_local
-from caldrive.world.roads import netconvert
-from caldrive.world.roads.netconvert import convert_opendrive
+from caldrive.world.roads import netconvert, towns
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.towns import load_roads
+from caldrive.world.town import load_town
 from tests.maps import sign_at, write_map
 
 needs_netconvert = pytest.mark.skipif(
@@ -23,6 +24,7 @@ needs_netconvert = pytest.mark.skipif(
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache for converted maps."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path / "cache" / "caldrive"
 
 
@@ -43,17 +45,43 @@ def test_a_missing_map_names_the_file(tmp_path: Path) -> None:
 
 def test_a_broken_map_says_so_and_leaves_nothing_in_the_cache(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "broken.xodr").write_text("<OpenDRIVE><road>")
-    with pytest.raises(ValueError, match="is no OpenDRIVE map"):
+    with pytest.raises(ValueError, match=r"broken\.xodr cannot be read \(it is no XML"):
         load_roads(str(tmp_path / "broken.xodr"))
     assert not list(cache.glob("*.xml"))
 
 
-@needs_netconvert
-def test_a_map_without_roads_gives_no_network(tmp_path: Path) -> None:
-    (tmp_path / "empty.xodr").write_text("<OpenDRIVE/>")
-    with pytest.raises(ValueError, match=r"found that netconvert cannot read .*empty\.xodr"):
-        convert_opendrive(tmp_path / "empty.xodr", tmp_path / "empty.net.xml")
-    assert [path.name for path in tmp_path.iterdir()] == ["empty.xodr"]
+@pytest.mark.parametrize("break_it", [OverflowError, KeyError, MemoryError, RecursionError, StopIteration])
+def test_whatever_goes_wrong_names_the_map(
+    break_it: type[Exception], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: bytes) -> None:
+        raise break_it("deep inside")
+
+    monkeypatch.setattr("caldrive.world.roads.opendrive.read_furniture", fail)
+    with pytest.raises(ValueError, match=rf"road\.xodr cannot be read \({break_it.__name__}: .*give another"):
+        load_roads(str(write_map(tmp_path)))
+
+
+def test_what_goes_wrong_in_the_scenery_of_a_map_names_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("caldrive.world.town.build_scenery", fail)
+    monkeypatch.setattr("caldrive.world.town.load_roads", lambda _: load_roads("town02"))
+    with pytest.raises(ValueError, match=r"found that odd\.xodr cannot be read \(ZeroDivisionError"):
+        load_town.__wrapped__("odd.xodr")
+    with pytest.raises(ZeroDivisionError):  # in a town of ours it is a fault of the program
+        load_town.__wrapped__("town02")
+
+
+def test_a_file_too_large_for_a_map_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(towns, "MOST_MEGABYTES", 1)
+    with (tmp_path / "huge.xodr").open("wb") as file:
+        file.truncate(10**12)  # it takes no room on the disk
+    with pytest.raises(ValueError, match=r"found more than 1 MB in .*huge\.xodr"):
+        load_roads(str(tmp_path / "huge.xodr"))
 
 
 @needs_netconvert
@@ -79,10 +107,25 @@ def test_a_map_is_converted_once(cache: Path, tmp_path: Path, monkeypatch: pytes
 
 
 @needs_netconvert
-def test_a_cache_that_cannot_be_written_is_no_obstacle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert len(load_roads(str(write_map(tmp_path))).driveable) == 2
+def test_another_version_of_sumo_converts_a_map_again(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_map(tmp_path)
+    first = load_roads(str(path))
+    load_roads.cache_clear()
+    monkeypatch.setattr(netconvert, "version", lambda _: "99.0")
+    assert load_roads(str(path)).network != first.network
+
+
+@needs_netconvert
+def test_a_network_that_broke_off_is_made_again(cache: Path, tmp_path: Path) -> None:
+    path = write_map(tmp_path)
+    first = load_roads(str(path))
+    whole = first.network.read_bytes()
+    first.network.write_bytes(whole[:1000])
+    load_roads.cache_clear()
+    assert len(load_roads(str(path)).driveable) == 2
+    assert first.network.read_bytes() == whole
 
 
 def test_without_netconvert_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,19 +4,37 @@ from __future__ import annotations
 
 import os
 import re
+import resource
+import signal
 import subprocess
-import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from importlib.metadata import version
 from pathlib import Path
+from typing import BinaryIO
+
+from caldrive.world.roads.memory_files import memory_file, path_of
+
+MOST_SECONDS = 300  # for one map
+MOST_SAID = 100_000  # bytes of what it says that are looked at
+_LIMITS = {  # seconds count even where this process is gone, and nobody waits
+    resource.RLIMIT_CPU: MOST_SECONDS, resource.RLIMIT_AS: 4 << 30, resource.RLIMIT_FSIZE: 1 << 30,
+    resource.RLIMIT_CORE: 0,
+}  # fmt: skip
 
 # Without these types an OpenDRIVE sidewalk takes cars, which then never move.
-_TYPES = """<types>
-  <type id="driving" numLanes="1" speed="13.89" disallow="pedestrian"/>
-  <type id="sidewalk" numLanes="1" speed="1.4" allow="pedestrian"/>
-  {closed}
-</types>"""
 _CLOSED = (
     "shoulder", "border", "stop", "none", "restricted", "parking", "median", "curb", "biking", "special1", "rail",
     "tram",
+)  # fmt: skip
+_LANE_TYPES = """<types>
+  <type id="driving" numLanes="1" speed="13.89" disallow="pedestrian"/>
+  <type id="sidewalk" numLanes="1" speed="1.4" allow="pedestrian"/>
+  {closed}
+</types>""".format(closed="\n  ".join(f'<type id="{name}" numLanes="1" disallow="all"/>' for name in _CLOSED)).encode()
+_OPENDRIVE = (
+    "--opendrive.internal-shapes", "--opendrive.import-all-lanes", "--opendrive.curve-resolution=0.5",
+    "--offset.disable-normalization",
 )  # fmt: skip
 _COMMON = [
     "--no-turnarounds", "--junctions.internal-link-detail=16", "--junctions.corner-detail=8", "--xml-validation=never",
@@ -35,37 +53,68 @@ def netconvert_binary() -> Path:
     return Path(sumo.SUMO_HOME) / "bin" / "netconvert"
 
 
-def run_netconvert(arguments: list[str], target: Path) -> None:
-    """Runs netconvert and puts its network at target, whole or not at all.
+def run_netconvert(inputs: Mapping[str, bytes], options: Sequence[str] = ()) -> bytes:
+    """The network that netconvert makes. inputs: what is in the files that it reads, by the option that names each.
 
-    Raises RuntimeError where it is not installed, CalledProcessError where it fails.
+    Raises RuntimeError where it is not installed, ValueError with its reason where it makes none.
     """
     binary = netconvert_binary()
-    environment = {**os.environ, "SUMO_HOME": str(binary.parent.parent)}
-    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-        network = Path(folder) / "net.xml"
-        command = [str(binary), *arguments, *_COMMON, f"--output-file={network}"]
-        subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
+    with ExitStack() as stack:
+        files = {option: stack.enter_context(memory_file(content)) for option, content in inputs.items()}
+        network, said = stack.enter_context(memory_file()), stack.enter_context(memory_file())
+        named = [f"--{option}={path_of(file)}" for option, file in files.items()]
+        command = [str(binary), *named, *options, *_COMMON, f"--output-file={path_of(network)}"]
+        code = _run(command, binary.parent.parent, [file.fileno() for file in (*files.values(), network)], said)
+        if code != 0:
+            raise ValueError(_reason(code, _content(said, MOST_SAID).decode(errors="replace")))
         # The header names the time and the command line: without it the same plan gives the same bytes.
-        network.write_text(re.sub(r"<!--.*?-->\s*", "", network.read_text(), flags=re.DOTALL))
-        os.replace(network, target)
+        return re.sub(rb"<!--.*?-->\s*", b"", _content(network), flags=re.DOTALL)
 
 
-def convert_opendrive(source: Path, target: Path) -> None:
-    """Turns an OpenDRIVE file into a SUMO network. Raises ValueError where the file is not a usable map."""
-    with tempfile.TemporaryDirectory() as folder:
-        types = Path(folder) / "types.xml"
-        closed = "\n  ".join(f'<type id="{name}" numLanes="1" disallow="all"/>' for name in _CLOSED)
-        types.write_text(_TYPES.format(closed=closed))
-        arguments = [
-            f"--opendrive-files={source}", f"--type-files={types}", "--opendrive.internal-shapes",
-            "--opendrive.import-all-lanes", "--opendrive.curve-resolution=0.5", "--offset.disable-normalization",
-        ]  # fmt: skip
+def _run(command: Sequence[str], home: Path, files: Sequence[int], said: BinaryIO) -> int:
+    """Runs a program of SUMO within its limits; returns its exit code. files: those that it may open; said: takes what
+    it says. Raises ValueError where it takes too long."""
+    environment = {**os.environ, "SUMO_HOME": str(home)}
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=said, stderr=said, pass_fds=files, env=environment
+    ) as process:
         try:
-            run_netconvert(arguments, target)
-        except subprocess.CalledProcessError as error:
-            reason = next((line for line in error.stderr.splitlines() if "rror" in line), "no reason given")
-            raise ValueError(
-                f"found that netconvert cannot read {source} ({reason}), wanted an OpenDRIVE map: "
-                "give another .xodr file"
-            ) from error
+            with suppress(ProcessLookupError):  # it is done already
+                _limit(process.pid)
+            return process.wait(MOST_SECONDS)
+        except subprocess.TimeoutExpired:
+            raise ValueError(f"netconvert works on it for more than {MOST_SECONDS} s") from None
+        finally:
+            process.kill()
+
+
+def _limit(process: int) -> None:
+    """Limits a running program by its number, unless somebody limits it more."""
+    for kind, most in _LIMITS.items():
+        _, hard = resource.prlimit(process, kind)
+        least = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.prlimit(process, kind, (least, least))
+
+
+def _content(file: BinaryIO, most: int = -1) -> bytes:
+    """What is in a file, up to so many bytes."""
+    file.seek(0)
+    return file.read(most)
+
+
+def _reason(code: int, said: str) -> str:
+    """Why netconvert failed, from its exit code (below 0: the signal that ended it) and from what it said."""
+    errors = [line for line in said.splitlines() if "rror" in line]
+    if code < 0:
+        return f"netconvert was ended by {signal.Signals(-code).name}"
+    return f"netconvert says: {errors[0] if errors else 'nothing'}"
+
+
+def convert_opendrive(content: bytes) -> bytes:
+    """An OpenDRIVE map as a SUMO network. Raises ValueError with netconvert's reason where the map is no use."""
+    return run_netconvert({"opendrive-files": content, "type-files": _LANE_TYPES}, _OPENDRIVE)
+
+
+def conversion() -> bytes:
+    """All that a network depends on beside the map: the version of SUMO, the options, the types of lanes."""
+    return repr((version("eclipse-sumo"), _OPENDRIVE, _COMMON, _LANE_TYPES)).encode()

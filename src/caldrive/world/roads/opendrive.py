@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from caldrive.datatypes import SPEED_SIGNS, Pose, Sign
 from caldrive.geometry import moved, wrap_angle
+from caldrive.world.roads.safe_xml import parse_xml
 
 _LIGHT_TYPE = "1000001"  # OpenDRIVE's own number for a three-lamp light
 _SPEED_TYPE = "274"  # the German catalogue's number for a limit, which OpenDRIVE files use
 
 
 def _number(element: ET.Element, name: str) -> float:
-    return float(element.get(name) or 0.0)
+    number = float(element.get(name) or 0.0)
+    if not math.isfinite(number):
+        raise ValueError(f"<{element.tag}> has {name}={number}")
+    return number
 
 
 def _along(geometry: ET.Element, ds: float) -> Pose:
     """The reference line's pose ds metres into a geometry: line, arc, spiral or paramPoly3."""
     start = Pose(_number(geometry, "x"), _number(geometry, "y"), _number(geometry, "hdg"))
-    shape = geometry[0]
+    shape = next(iter(geometry), None)
+    if shape is None:
+        raise ValueError("a <geometry> is no line, arc, spiral or polynomial")
     if shape.tag == "paramPoly3":
         return _along_polynomial(start, shape, ds, _number(geometry, "length"))
     first = last = 0.0
@@ -49,13 +54,14 @@ def _along_polynomial(start: Pose, shape: ET.Element, ds: float, length: float) 
 def _pose(road: ET.Element, thing: ET.Element, heading_name: str) -> Pose:
     """Of a sign or signal; heading: that of the traffic it faces, which drives on the right."""
     s, t = _number(thing, "s"), _number(thing, "t")
-    geometries = road.findall("planView/geometry")
-    here = [g for g in geometries if _number(g, "s") <= s + 1e-6][-1]
+    here = [g for g in road.findall("planView/geometry") if _number(g, "s") <= s + 1e-6]
+    if not here:
+        raise ValueError(f"road {road.get('id')} has no <geometry> at s={s}, where <{thing.tag}> {thing.get('id')} is")
     offset = 0.0 if t < 0 else math.pi
     if thing.get(heading_name):
         # CARLA counts it from the road, the standard from the thing's orientation: they differ by half a turn.
         offset += math.remainder(_number(thing, heading_name) - offset, math.pi)
-    return moved(_along(here, s - _number(here, "s")), left=t, turn=offset)
+    return moved(_along(here[-1], s - _number(here[-1], "s")), left=t, turn=offset)
 
 
 def _limit(thing: ET.Element) -> int | None:
@@ -65,18 +71,13 @@ def _limit(thing: ET.Element) -> int | None:
     return int(value) if value in SPEED_SIGNS else None
 
 
-def read_furniture(path: Path) -> tuple[list[Pose], list[Sign]]:
-    """Posts of traffic lights and speed signs of an OpenDRIVE map, each once. Raises ValueError for a broken file."""
-    try:
-        root = ET.parse(path).getroot()
-        furniture = _furniture(root)
-    except (ET.ParseError, ValueError, IndexError) as error:
-        raise ValueError(
-            f"found that {path} is no OpenDRIVE map ({error}), wanted one: give another .xodr file"
-        ) from error
+def read_furniture(content: bytes) -> tuple[list[Pose], list[Sign]]:
+    """Posts of traffic lights and speed signs of an OpenDRIVE map, each once. Raises ValueError with the reason where
+    it is none."""
+    root = parse_xml(content)
     if root.tag != "OpenDRIVE":
-        raise ValueError(f"found <{root.tag}> in {path}, wanted <OpenDRIVE>: give another .xodr file")
-    return furniture
+        raise ValueError(f"it is <{root.tag}>, not <OpenDRIVE>")
+    return _furniture(root)
 
 
 def _furniture(root: ET.Element) -> tuple[list[Pose], list[Sign]]:

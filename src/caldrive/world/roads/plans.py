@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import subprocess
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -17,6 +15,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from caldrive.datatypes import KMH, Points
+from caldrive.files import write_whole
 
 LANE_WIDTH = 4.0  # m
 CORNER_RADIUS = 20.0  # m
@@ -154,8 +153,8 @@ def _add_edge(edges: ET.Element, name: str, start: str, end: str, shape: Points,
     )  # fmt: skip
 
 
-def write_network(plan: Plan, target: Path) -> None:
-    """Writes a plan as a SUMO network. Needs netconvert (the extra `opendrive`)."""
+def network_of(plan: Plan) -> bytes:
+    """A plan as a SUMO network. Needs netconvert (the extra `opendrive`)."""
     from caldrive.world.roads.netconvert import run_netconvert
 
     nodes, edges = ET.Element("nodes"), ET.Element("edges")
@@ -163,18 +162,10 @@ def write_network(plan: Plan, target: Path) -> None:
         ET.SubElement(nodes, "node", id=name, x=str(x), y=str(y), type="traffic_light", radius="7")
     for street in plan.streets:
         _add_street(nodes, edges, plan, street)
-    with tempfile.TemporaryDirectory() as folder:
-        files = {"node": nodes, "edge": edges}
-        for kind, root in files.items():
-            ET.ElementTree(root).write(Path(folder) / f"{kind}.xml")
-        run_netconvert(
-            [f"--{kind}-files={folder}/{kind}.xml" for kind in files] + ["--offset.disable-normalization"], target
-        )
+    inputs = {"node-files": ET.tostring(nodes), "edge-files": ET.tostring(edges)}
+    return run_netconvert(inputs, ["--offset.disable-normalization"])
 
 
 if __name__ == "__main__":
     for plan in PLANS.values():
-        try:
-            write_network(plan, Path(__file__).parent / "data" / f"{plan.name}.net.xml")
-        except subprocess.CalledProcessError as error:
-            raise SystemExit(error.stderr) from error
+        write_whole(Path(__file__).parent / "data" / f"{plan.name}.net.xml", network_of(plan))

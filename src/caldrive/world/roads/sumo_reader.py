@@ -26,12 +26,12 @@ def read_roads(
 ) -> RoadNetwork:
     """Reads a SUMO network. posts and signs: those of an OpenDRIVE map; None puts them where our towns have them.
 
-    Raises ValueError where it has no lane to drive on.
+    Raises ValueError with the reason where it has no lane to drive on.
     """
     net = sumolib.net.readNet(str(network), withInternal=True)
     lanes = _join(net, _read_lanes(net))
     if not any(not lane.internal for lane in lanes.values()):
-        raise ValueError(f"found no lane of type driving in {name}, wanted one at least: give another map")
+        raise ValueError("it has no lane of type driving")
     return RoadNetwork(
         name=name,
         network=network,

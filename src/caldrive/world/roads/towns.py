@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
-from caldrive.provenance import file_digest
+from caldrive.world.roads.map_cache import digest, kept_network
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.sumo_reader import read_roads
 
 TOWNS = ("town01", "town02")
+MOST_MEGABYTES = 64  # of a map's file; cities of hundreds of kilometres of road have less
 
 _DATA = Path(__file__).parent / "data"
 
 
-def _cache_folder() -> Path:
-    """Where converted maps are kept between runs."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "caldrive"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        folder = Path(tempfile.mkdtemp(prefix="caldrive-"))
-    return folder
-
-
 @lru_cache(maxsize=4)
 def load_roads(town: str) -> RoadNetwork:
-    """The roads of `town01`, `town02` or an OpenDRIVE file. Raises ValueError or FileNotFoundError."""
+    """The roads of `town01`, `town02` or an OpenDRIVE file. Raises ValueError, OSError, or RuntimeError where a map
+    needs what is not installed."""
     if town in TOWNS:
         return read_roads(town, _DATA / f"{town}.net.xml", appearance=town)
     path = Path(town)
@@ -44,11 +35,39 @@ def load_roads(town: str) -> RoadNetwork:
 
 
 def _load_opendrive(path: Path) -> RoadNetwork:
-    from caldrive.world.roads.netconvert import convert_opendrive
+    from caldrive.world.roads.netconvert import conversion, convert_opendrive, netconvert_binary
     from caldrive.world.roads.opendrive import read_furniture
 
-    posts, signs = read_furniture(path)
-    network = _cache_folder() / f"{path.stem}-{file_digest(path)}.net.xml"
-    if not network.is_file():
-        convert_opendrive(path, network)
-    return read_roads(path.stem, network, appearance="town01", posts=posts, signs=signs)
+    netconvert_binary()  # else every map would seem broken
+    content = _read_map(path)
+    with one_sentence(str(path)):
+        posts, signs = read_furniture(content)
+        network = kept_network(digest(content, conversion()), lambda: convert_opendrive(content))
+        return read_roads(path.stem, network, appearance="town01", posts=posts, signs=signs)
+
+
+def _read_map(path: Path) -> bytes:
+    """The bytes of a map. Raises ValueError for a file that is too large to be one, OSError where it is unreadable."""
+    with path.open("rb") as file:
+        content = file.read(MOST_MEGABYTES * 10**6 + 1)
+    if len(content) > MOST_MEGABYTES * 10**6:
+        raise ValueError(
+            f"found more than {MOST_MEGABYTES} MB in {path}, wanted an OpenDRIVE map of {MOST_MEGABYTES} MB at most: "
+            "cut a smaller part out of it"
+        )
+    return content
+
+
+@contextmanager
+def one_sentence(town: str) -> Iterator[None]:
+    """Says of whatever goes wrong over somebody's map which file is to blame; what goes wrong over our own towns is a
+    fault of the program. Raises ValueError."""
+    try:
+        yield
+    except Exception as error:  # no list of what XML, SUMO, numpy and shapely may raise would be complete
+        if town in TOWNS:
+            raise
+        kind = "" if type(error) is ValueError else f"{type(error).__name__}: "
+        raise ValueError(
+            f"found that {town} cannot be read ({kind}{error}), wanted an OpenDRIVE map: give another .xodr file"
+        ) from error

@@ -8,7 +8,8 @@ from __future__ import annotations
 import gc
 import math
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import libsumo
@@ -17,46 +18,17 @@ import numpy as np
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
+from caldrive.world.traffic.start_places import free_places
 from caldrive.world.traffic.sumo_inputs import SumoLights, speed_caps
 from caldrive.world.traffic.traffic_lights import TrafficLights
 
 EGO = "ego"
 DRIVERS = Path(__file__).with_name("drivers.add.xml")
-SPACING = 12.0  # m of lane that a car takes at the start
-CLEAR_OF_EGO = 18.0  # m around the ego that stay free at the start
 LONGEST_WAIT = 60.0  # s until a car that is stuck is moved elsewhere
 OUT_OF_SIGHT, BESIDE = 70.0, 25.0  # m from the ego, where its camera looks and elsewhere
 LONGEST_WAY, LAST_EDGES = 30, 6  # edges of a random way, and how many of it are left when it gets a new one
 CHECK_EVERY = 20  # steps, from one look after cars that are stuck or near the end of their way to the next
 MODELS = (("compact", 4.2, 1.76), ("estate", 4.6, 1.8), ("van", 4.9, 1.95))  # name, length, width in m
-
-
-def start_places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
-    """Where in a town a car may stand at the start: on which lane, and how far along it (m)."""
-    return [(lane, float(s)) for lane in roads.driveable for s in np.arange(SPACING, lane.line.length - 2.0, SPACING)]
-
-
-def room(roads: RoadNetwork) -> int:
-    """How many cars a town holds, wherever the ego stands."""
-    poses = [lane.line.pose_at(s) for lane, s in start_places(roads)]
-    places = np.array([(pose.x, pose.y) for pose in poses]).reshape(-1, 2)
-    apart = np.linalg.norm(places[:, None] - places[None], axis=-1)
-    near = (apart <= CLEAR_OF_EGO + SPACING / 2).sum(axis=1)  # the ego may stand between two places
-    return len(places) - int(near.max(initial=0))
-
-
-def free_places(roads: RoadNetwork, n: int, ego: Pose) -> list[tuple[Lane, float]]:
-    """Where a car may stand at the start, away from the ego. Raises ValueError where there is no room for n."""
-    free = []
-    for lane, s in start_places(roads):
-        place = lane.line.pose_at(s)
-        if math.hypot(place.x - ego.x, place.y - ego.y) > CLEAR_OF_EGO:
-            free.append((lane, s))
-    if n > len(free):
-        raise ValueError(
-            f"found {n} cars asked for, but {roads.name} has room for {len(free)}: ask for fewer with --cars"
-        )
-    return free
 
 
 _driving: weakref.ref[Traffic] | None = None  # the traffic that libsumo simulates; it can hold one in a process
@@ -88,12 +60,21 @@ class Traffic:
         self.roads, self.rng, self.dt = roads, np.random.default_rng(seed), dt
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
         starts = self._random_places(n, ego)
+        self._capped: set[str] = set()  # cars that are told how fast they may drive
         _take_sumo(self)
-        _load(roads, dt, seed)
+        try:
+            with _one_sentence(roads.name):
+                self._start(seed, ego, starts, lights)
+        except BaseException:
+            self.close()  # nobody else can: there is no traffic yet
+            raise
+
+    def _start(self, seed: int, ego: VehicleState, starts: Sequence[tuple[Lane, float]], lights: TrafficLights) -> None:
+        """Begins the simulation, with each car at its place."""
+        _load(self.roads, self.dt, seed)
         self._add_ego(ego)
         for name, (lane, s) in zip(self.size, starts, strict=True):
             self._add(name, lane, s)
-        self._capped: set[str] = set()  # cars that are told how fast they may drive
         self._lights = SumoLights(lights)
         libsumo.simulationStep()
         self.cars = self._read()
@@ -144,6 +125,10 @@ class Traffic:
                 "found an episode that has lost SUMO, which simulates one at a time, wanted a running one: "
                 "call reset(scenario)"
             )
+        with _one_sentence(self.roads.name):
+            self._move(time, ego, people)
+
+    def _move(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
         self._lights.update()
         front = moved(ego.pose, forward=ego.length / 2)
         angle = 90.0 - math.degrees(ego.pose.heading)
@@ -192,6 +177,18 @@ class Traffic:
 
     def _read(self) -> tuple[VehicleState, ...]:
         return tuple(self._state(name) for name in libsumo.vehicle.getIDList() if name != EGO)
+
+
+@contextmanager
+def _one_sentence(town: str) -> Iterator[None]:
+    """Says what SUMO refuses. Raises RuntimeError."""
+    try:
+        yield
+    except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+        raise RuntimeError(
+            f"found that SUMO cannot let cars drive in {town} ({error}), wanted traffic: "
+            "give another map, or drive alone with --cars 0"
+        ) from error
 
 
 def _load(roads: RoadNetwork, dt: float, seed: int) -> None:
