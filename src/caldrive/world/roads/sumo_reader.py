@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import sumolib
 
-from caldrive.datatypes import Command, Pose, Sign
+from caldrive.datatypes import Command, Points, Pose, Sign
 from caldrive.geometry import Polyline, moved, to_local, wrap_angle
 from caldrive.world.roads.network import POST_BESIDE_LANE, Lane, LightPost, RoadNetwork, StopLine
 
 SHORTEST_LANE = 1e-3  # m; shorter ones only join others
+FARTHEST, WIDEST, LONGEST = 10_000, 30, 300  # km: from the origin, from side to side, all lanes together
 MOST_AHEAD, SIDE = 12.0, (-9.0, -1.0)  # m from a lane's end, ahead and to the left, where its post on a map may stand
 AFTER_LIMIT_CHANGE = 2.0  # m behind which the sign stands
 SIGN_SHARE, SIGN_LEAST = 0.4, 40.0  # where on a street after a junction its sign stands, and how long (m) it must be
@@ -30,8 +31,7 @@ def read_roads(
     """
     net = sumolib.net.readNet(str(network), withInternal=True)
     lanes = _join(net, _read_lanes(net))
-    if not any(not lane.internal for lane in lanes.values()):
-        raise ValueError("it has no lane of type driving")
+    _require_town(lanes)
     return RoadNetwork(
         name=name,
         network=network,
@@ -40,6 +40,21 @@ def read_roads(
         posts=_read_posts(net, lanes, posts),
         signs=tuple(signs) if signs is not None else signs_at_limit_changes(lanes),
     )
+
+
+def _require_town(lanes: dict[str, Lane]) -> None:
+    """Raises ValueError with the reason where lanes are none to drive on, or more than memory holds."""
+    if all(lane.internal for lane in lanes.values()):
+        raise ValueError("it has no lane of type driving that is longer than a millimetre")
+    points = np.concatenate([lane.line.points for lane in lanes.values()])
+    if np.abs(points).max() > FARTHEST * 1000:
+        raise ValueError(f"it has roads more than {FARTHEST} km from its origin")
+    for what, km, most in (
+        ("reaches over", float(np.ptp(points, axis=0).max()) / 1000, WIDEST),
+        ("has lanes of", sum(lane.line.length for lane in lanes.values()) / 1000, LONGEST),
+    ):
+        if km > most:
+            raise ValueError(f"it {what} {km:.0f} km, more than {most}: cut a smaller part out of it")
 
 
 def _allows_cars(lane: sumolib.net.lane.Lane) -> bool:
@@ -52,7 +67,7 @@ def _read_lanes(net: sumolib.net.Net) -> dict[str, Lane]:
     for edge in net.getEdges(withInternal=True):
         for raw in edge.getLanes():
             points = np.array(raw.getShape())[:, :2]
-            if not _allows_cars(raw) or np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < SHORTEST_LANE:
+            if not _allows_cars(raw) or not _is_line(points):
                 continue
             lanes[raw.getID()] = Lane(
                 id=raw.getID(),
@@ -62,6 +77,12 @@ def _read_lanes(net: sumolib.net.Net) -> dict[str, Lane]:
                 internal=edge.getFunction() == "internal",
             )
     return lanes
+
+
+def _is_line(points: Points) -> bool:
+    """Whether points (N, 2) are more than one place, and no infinite ones."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    return bool(np.isfinite(length) and length >= SHORTEST_LANE)
 
 
 def _is_junction(node: sumolib.net.node.Node) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from caldrive.datatypes import Points
 from caldrive.geometry import Polyline
@@ -77,5 +78,6 @@ def without_overlaps(shapes: Shapes) -> NDArray[np.bool_]:
 
 def clear_of(places: Points, centers: Points, distance: float) -> NDArray[np.bool_]:
     """Which places (N, 2) lie further than a distance (m) from all centres (M, 2)."""
-    gaps = np.hypot(*(places[:, None] - centers).transpose(2, 0, 1))
-    return np.asarray((gaps > distance).all(1))
+    # A table of all distances would need gigabytes for a large map.
+    gaps, _ = KDTree(centers).query(places)
+    return np.asarray(gaps > distance)

@@ -3,63 +3,94 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image as PILImage
 from PIL import ImageDraw
+from shapely import STRtree
 
-from caldrive.datatypes import Pose, VehicleState
+from caldrive.datatypes import Points, Pose, VehicleState
 from caldrive.geometry import Polyline, to_world
 from caldrive.world.roads.network import RoadNetwork, lane_area
 
 CELL = 0.2  # m
 MARGIN = 12.0  # m around the roads
+TILE, KEPT = 2400, 8  # cells along a side of a tile, and how many tiles are remembered
 _SAMPLES = (12, 6)  # along and across the car
 
 
+@dataclass(frozen=True)
+class _Tile:
+    """A square of the town, TILE cells wide."""
+
+    lane: NDArray[np.int32]  # the number of the lane, 0 for none
+    sidewalk: NDArray[np.bool_]
+
+
 class GroundRaster:
-    """A raster with sidewalks and the lanes outside junctions, in cells of CELL metres."""
+    """Sidewalks and the lanes outside junctions in cells of CELL metres, drawn tile by tile where somebody drives."""
 
     def __init__(self, roads: RoadNetwork) -> None:
-        x0, y0, x1, y1 = roads.bounds
+        x0, y0, _, _ = roads.bounds
         self.origin = np.array([x0 - MARGIN, y0 - MARGIN])
-        self.shape = (math.ceil((y1 - y0 + 2 * MARGIN) / CELL), math.ceil((x1 - x0 + 2 * MARGIN) / CELL))
-        self.sidewalk = self._draw([(polygon, 1) for polygon in shapely.get_parts(roads.sidewalk)]) == 1
         self.lines: list[Polyline] = [lane.line for lane in roads.driveable]
-        areas = (lane_area(lane.line, lane.width) for lane in roads.driveable)
-        self.lane = self._draw([(area, number) for number, area in enumerate(areas, start=1)])  # 0: none
+        self._lanes = STRtree([lane_area(lane.line, lane.width) for lane in roads.driveable])
+        self._sidewalks = STRtree(shapely.get_parts(roads.sidewalk))
+        self._tiles: dict[tuple[int, int], _Tile] = {}
 
-    def _draw(self, polygons: list[tuple[shapely.Polygon, int]]) -> NDArray[np.int32]:
-        """A raster (rows, columns) with each polygon's value where it lies, 0 elsewhere; later ones lie on top."""
-        canvas = PILImage.new("I", (self.shape[1], self.shape[0]))
-        brush = ImageDraw.Draw(canvas)
-        for polygon, value in polygons:
-            for ring, color in ((polygon.exterior, value), *((hole, 0) for hole in polygon.interiors)):
-                # The brush paints the cells that the border touches too: half a cell on each side.
-                inner = shapely.Polygon(ring).buffer(-CELL / 2, join_style="mitre").exterior
-                if not inner.is_empty:
-                    brush.polygon([tuple(p) for p in (np.array(inner.coords) - self.origin) / CELL - 0.5], fill=color)
-        return np.array(canvas, dtype=np.int32)
+    def _tile(self, column: int, row: int) -> _Tile:
+        """A tile by its number from the origin."""
+        if (column, row) not in self._tiles:
+            if len(self._tiles) >= KEPT:
+                self._tiles.pop(next(iter(self._tiles)))
+            low = self.origin + TILE * CELL * np.array([column, row])
+            area = shapely.box(*low, *(low + TILE * CELL))
+            lanes = np.sort(self._lanes.query(area))
+            sidewalks = self._sidewalks.geometries[np.sort(self._sidewalks.query(area))]
+            self._tiles[column, row] = _Tile(
+                lane=_draw([(self._lanes.geometries[k], int(k) + 1) for k in lanes], low),
+                sidewalk=_draw([(polygon, 1) for polygon in sidewalks], low) == 1,
+            )
+        return self._tiles[column, row]
 
     def shares(self, car: VehicleState, travel: float) -> tuple[float, float]:
         """Shares in [0, 1] of the car's area on the opposite lane and on the sidewalk. travel: the route's heading
         there, rad."""
         cells = np.floor((_spread(car) - self.origin) / CELL).astype(int)
-        inside = ((cells >= 0) & (cells < self.shape[::-1])).all(1)
-        x, y = cells[inside].T
-        lanes = self.lane[y, x]
+        tiles = cells // TILE
+        lanes, sidewalk = np.zeros(len(cells), np.int32), np.zeros(len(cells), bool)
+        for column, row in np.unique(tiles, axis=0).tolist():
+            here = (tiles == (column, row)).all(1)
+            x, y = (cells[here] % TILE).T
+            tile = self._tile(column, row)
+            lanes[here], sidewalk[here] = tile.lane[y, x], tile.sidewalk[y, x]
         opposite = sum(
             int((lanes == number).sum())
             for number in np.unique(lanes)
             if number and self._opposes(int(number), car.pose, travel)
         )
-        return opposite / len(cells), float(self.sidewalk[y, x].sum()) / len(cells)
+        return opposite / len(cells), float(sidewalk.sum()) / len(cells)
 
     def _opposes(self, number: int, pose: Pose, travel: float) -> bool:
         """Whether traffic on a lane runs against a direction of travel (rad)."""
         return math.cos(self.lines[number - 1].project(pose.x, pose.y).heading - travel) < -0.5
+
+
+def _draw(polygons: list[tuple[shapely.Polygon, int]], low: Points) -> NDArray[np.int32]:
+    """A tile (rows, columns) from its lowest corner (2,) on, with each polygon's value where it lies, 0 elsewhere; later
+    ones lie on top."""
+    canvas = PILImage.new("I", (TILE, TILE))
+    brush = ImageDraw.Draw(canvas)
+    for polygon, value in polygons:
+        for ring, color in ((polygon.exterior, value), *((hole, 0) for hole in polygon.interiors)):
+            # The brush paints the cells that the border touches too: half a cell on each side.
+            inner = shapely.Polygon(ring).buffer(-CELL / 2, join_style="mitre").exterior
+            if not inner.is_empty:
+                brush.polygon([tuple(p) for p in (np.array(inner.coords) - low) / CELL - 0.5], fill=color)
+    return np.array(canvas, dtype=np.int32)
 
 
 def _spread(car: VehicleState) -> NDArray[np.float64]:
