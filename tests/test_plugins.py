@@ -106,6 +106,44 @@ def test_code_that_ends_the_program_is_named_with_its_line(file: Path) -> None:
         load_plugin(f"{file.parent / 'late.py'}:Driver", "--agent").build()
 
 
+FAULTS = {
+    "syntax": (b"x = 1\ny = x +\n", r"SyntaxError: .*, fault\.py line 2\)"),
+    "an import that is not there": (b"\nimport nosuch", r"No module named 'nosuch', fault\.py line 2\)"),
+    "recursion without end": (b"def f():\n    f()\nf()", r"RecursionError: .*, fault\.py line 2\)"),
+    "another encoding": (b"x = 1\ny = '\xe4'", r"SyntaxError: .*utf-8.*, fault\.py line \d\)"),
+    "an unknown encoding": (b"# -*- coding: klingon -*-", r"unknown encoding: klingon, fault\.py line 0\)"),
+    "null bytes": (b"x = 1\0", r"fault\.py cannot be loaded \(SyntaxError: .*null bytes"),
+    "depth": (b"(" * 3000 + b")" * 3000, r"SyntaxError: too many nested parentheses, fault\.py line 1\)"),
+    "an error of its own kind": (b"class E(BaseException): pass\nraise E", r"\(E: , fault\.py line 2\)"),
+    "an error without words": (b"class E(Exception):\n  def __str__(s): 1/0\nraise E", r"\(E, fault\.py line 3\)"),
+    "names that raise": (b"def __getattr__(name): raise OSError(name)", r"gives no 'Driver' \(OSError: Driver, fault"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_file_with_a_fault_is_named_with_its_line(fault: str, tmp_path: Path) -> None:
+    code, message = FAULTS[fault]
+    (tmp_path / "fault.py").write_bytes(code)
+    with pytest.raises(ValueError, match=message):
+        load_plugin(f"{tmp_path / 'fault.py'}:Driver", "--agent")
+
+
+def test_a_file_too_large_for_code_is_refused_unread(tmp_path: Path) -> None:
+    with (tmp_path / "huge.py").open("wb") as file:
+        file.truncate(10**12)  # it takes no room on the disk
+    with pytest.raises(ValueError, match=r"found 1000000 MB in .*huge\.py, wanted Python code of 10 MB"):
+        load_plugin(f"{tmp_path / 'huge.py'}:Driver", "--agent")
+
+
+@pytest.mark.parametrize("name", ["loop.py", "a" * 5000 + ".py", "nul\0.py"], ids=["circle", "long", "null byte"])
+def test_a_name_that_no_file_can_have_is_no_file(name: str, tmp_path: Path) -> None:
+    (tmp_path / "loop.py").symlink_to("loop.py")
+    if "\0" not in name:
+        assert full_name(f"{tmp_path / name}:Driver").endswith(f"{name}:Driver")
+    with pytest.raises(ValueError, match=r"found no file .*wanted Python code"):
+        load_plugin(f"{tmp_path / name}:Driver", "--agent")
+
+
 def test_names_are_the_same_in_every_folder_and_short_in_tables(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(file.parent)
     assert full_name("own.py:Driver") == f"{file}:Driver"

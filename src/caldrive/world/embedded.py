@@ -54,7 +54,11 @@ class EmbeddedWorld:
         if self._episode is not None:
             self._episode.release()
         self._episode = Episode(town, scenario, route, self.vehicle, self._timed)
-        return self._observe()
+        try:
+            return self._observe()
+        except BaseException:
+            self.close()  # without its first image there is no episode
+            raise
 
     def step(self, control: Control) -> Observation:
         """Moves everything on by dt."""

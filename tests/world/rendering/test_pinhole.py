@@ -20,3 +20,18 @@ def test_a_camera_sees_what_lies_in_its_angle() -> None:
     frustum = PinholeCamera(Pose(0, 0, 0), height=1.2, pitch=0.0, fov=90.0, size=(200, 88)).frustum()
     seen = frustum.sees(np.array([(10.0, 9.0), (10.0, 11.5), (-5.0, 0.0)]), 0.5)
     assert seen.tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        (CameraConfig(width=60_000), "found a camera of 60000 x 88 pixels, wanted 1 to 4096"),
+        (CameraConfig(height=0), "found a camera of 200 x 0 pixels"),
+        (CameraConfig(fov=0.0), "found a camera that sees 0°"),
+        (CameraConfig(fov=float("nan")), "found a camera that sees nan°"),
+        (CameraConfig(fov=180.0), "found a camera that sees 180°"),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused_before_room_is_made_for_it(config: CameraConfig, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        camera_on(VehicleState(Pose(0, 0, 0)), config)

@@ -49,7 +49,13 @@ def test_one_that_takes_too_long_is_ended(program: Path, monkeypatch: pytest.Mon
 def test_it_has_limits_of_its_own(program: Path) -> None:
     says(program, 'until [ "$(ulimit -f)" != unlimited ]; do :; done; { ulimit -t; ulimit -v; } > "$output"')
     seconds, kilobytes = map(int, run_netconvert({}).split())
-    assert (seconds, kilobytes) == (300, 4 << 20)
+    assert (seconds, kilobytes) == (60, 4 << 20)
+
+
+def test_one_that_works_too_hard_is_named(program: Path) -> None:
+    says(program, "kill -XCPU $$")
+    with pytest.raises(ValueError, match="netconvert works on it for more than 60 s"):
+        run_netconvert({})
 
 
 def test_its_own_error_is_passed_on(program: Path) -> None:

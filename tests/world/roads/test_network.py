@@ -204,3 +204,13 @@ def test_standing_posts_are_given_to_the_approach_that_they_face(town02: RoadNet
 def test_an_approach_without_a_standing_post_has_no_light(town02: RoadNetwork) -> None:
     again = read_roads("again", town02.network, appearance="town02", posts=[town02.posts[0].pose], signs=[])
     assert [post.lane for post in again.posts] == [town02.posts[0].lane]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("x", [1e308, float("nan"), float("-inf")])
+def test_a_place_out_of_the_world_is_refused_before_it_is_reckoned_with(x: float, town02: RoadNetwork) -> None:
+    message = r"found the place \(.*, 0\), wanted one in town02: from \(-4, -4\) to \(204, 204\)"
+    with pytest.raises(ValueError, match=message):
+        town02.lane_at(Pose(x, 0.0, 0.0))
+    with pytest.raises(ValueError, match=message):
+        town02.nearest_heading(x, 0.0)

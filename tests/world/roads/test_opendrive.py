@@ -130,3 +130,11 @@ def test_a_map_without_roads_has_no_furniture(tmp_path: Path) -> None:
     path = tmp_path / "empty.xodr"
     path.write_text("<OpenDRIVE/>")
     assert read_furniture(path) == ([], [])
+
+
+@pytest.mark.parametrize("length", ["1e308", "-1", "nan", "100001"])
+def test_a_length_that_no_road_has_says_so(length: str, tmp_path: Path) -> None:
+    path = write_map(tmp_path)
+    path.write_text(path.read_text().replace('hdg="0" length="100"', f'hdg="0" length="{length}"'))
+    with pytest.raises(ValueError, match=f"<geometry> .*length={length}"):
+        read_furniture(path)

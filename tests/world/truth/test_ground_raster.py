@@ -11,6 +11,7 @@ import shapely
 from caldrive.datatypes import Pose, VehicleState
 from caldrive.geometry import box_corners, moved
 from caldrive.world.roads.network import SIDEWALK_WIDTH, Lane, RoadNetwork
+from caldrive.world.truth import ground_raster
 from caldrive.world.truth.ground_raster import GroundRaster
 
 
@@ -100,3 +101,15 @@ def test_the_sidewalk_is_found_all_over_the_town(raster: GroundRaster, town02: R
     assert max(true) > 0.9
     assert measured == pytest.approx(true, abs=0.15)
     assert np.mean(np.abs(np.subtract(measured, true))) < 0.02
+
+
+def test_a_raster_in_small_tiles_tells_the_same(
+    raster: GroundRaster, town02: RoadNetwork, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ground_raster, "TILE", 100)  # 20 m
+    monkeypatch.setattr(ground_raster, "KEPT", 2)
+    tiled, rng = GroundRaster(town02), np.random.default_rng(0)
+    for lane in town02.driveable[:30]:
+        pose = moved(lane.line.pose_at(5.0), left=float(rng.uniform(-6, 6)), turn=float(rng.uniform(-1, 1)))
+        assert shares(tiled, pose, 0.0) == shares(raster, pose, 0.0)
+    assert len(tiled._tiles) == 2

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.checks import MOST_PIXELS
 from caldrive.datatypes import CameraConfig, Pose, VehicleState
 from caldrive.geometry import moved
 
@@ -52,6 +53,16 @@ class PinholeCamera:
     """Horizontal field of view, degrees."""
     size: tuple[int, int]
     """Width and height, pixels."""
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a picture that no camera takes, before room is made for it."""
+        if not all(1 <= side <= MOST_PIXELS for side in self.size):
+            raise ValueError(
+                f"found a camera of {self.size[0]} x {self.size[1]} pixels, wanted 1 to {MOST_PIXELS} on each side: "
+                "give CameraConfig(width=200, height=88)"
+            )
+        if not 0 < self.fov < 180:
+            raise ValueError(f"found a camera that sees {self.fov:g}°, wanted 1° to 179°: give CameraConfig(fov=90.0)")
 
     @property
     def focal(self) -> float:

@@ -21,6 +21,7 @@ from caldrive.geometry import Polyline
 SIDEWALK_WIDTH = 3.0  # m
 POST_BESIDE_LANE = 1.1  # m from the kerb to the foot of a post
 ON_LANE = 4.0  # m from a lane's middle within which a place is on it
+OUT_OF_THE_WORLD = 1e8  # m from the origin
 StopLine = tuple[tuple[float, float], tuple[float, float]]  # its ends, left end first, m
 
 
@@ -113,6 +114,7 @@ class RoadNetwork:
 
     def lane_at(self, pose: Pose) -> tuple[Lane, float]:
         """The lane under a pose that runs its way, and the arc length there (m). Raises ValueError over 4 m off any."""
+        self._require_near(pose.x, pose.y)
         best: tuple[float, Lane, float] | None = None
         low, high, at = self._boxes[:, :2], self._boxes[:, 2:], (pose.x, pose.y)
         around = (low < np.add(at, ON_LANE)) & (high > np.subtract(at, ON_LANE))
@@ -128,6 +130,12 @@ class RoadNetwork:
             )
         return best[1], best[2]
 
+    def _require_near(self, x: float, y: float) -> None:
+        """Raises ValueError for a place so far away that its distance cannot be reckoned."""
+        if not max(abs(x), abs(y)) < OUT_OF_THE_WORLD:
+            low, high = ("({:.0f}, {:.0f})".format(*corner) for corner in (self.bounds[:2], self.bounds[2:]))
+            raise ValueError(f"found the place ({x:g}, {y:g}), wanted one in {self.name}: from {low} to {high}")
+
     def _closest(self, x: float, y: float) -> tuple[Lane, Pose]:
         """The lane that runs nearest to a place, and where it is nearest."""
         hits = [(lane, lane.line.project(x, y)) for lane in self.driveable]
@@ -139,7 +147,8 @@ class RoadNetwork:
         return f"{lane.id} at ({at.x:.1f}, {at.y:.1f}) with heading {_degrees(at)}"
 
     def nearest_heading(self, x: float, y: float) -> float:
-        """The heading of the lane that runs nearest to a place, rad."""
+        """The heading of the lane that runs nearest to a place, rad. Raises ValueError for a place out of the world."""
+        self._require_near(x, y)
         return self._closest(x, y)[1].heading
 
 

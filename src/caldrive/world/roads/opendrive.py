@@ -13,6 +13,7 @@ from caldrive.geometry import moved, wrap_angle
 from caldrive.world.roads.safe_xml import parse_xml
 
 _LIGHT_TYPE = "1000001"  # OpenDRIVE's own number for a three-lamp light
+LONGEST_ROAD = 1e5  # m
 _SPEED_TYPE = "274"  # the German catalogue's number for a limit, which OpenDRIVE files use
 
 
@@ -80,9 +81,17 @@ def read_furniture(content: bytes) -> tuple[list[Pose], list[Sign]]:
     return _furniture(root)
 
 
+def _require_lengths(road: ET.Element) -> None:
+    """Raises ValueError for a length that no road has: netconvert would work on it for hours."""
+    for part in (road, *road.findall("planView/geometry")):
+        if not 0 <= _number(part, "length") <= LONGEST_ROAD:
+            raise ValueError(f"<{part.tag}> of road {road.get('id')} has length={part.get('length')}")
+
+
 def _furniture(root: ET.Element) -> tuple[list[Pose], list[Sign]]:
     posts, signs = [], {}
     for road in root.findall("road"):
+        _require_lengths(road)
         for thing in [*road.findall("signals/signal"), *road.findall("objects/object")]:
             limit = _limit(thing)
             if limit is not None:

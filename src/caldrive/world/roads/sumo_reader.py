@@ -15,6 +15,7 @@ from caldrive.geometry import Polyline, moved, to_local, wrap_angle
 from caldrive.world.roads.network import POST_BESIDE_LANE, Lane, LightPost, RoadNetwork, StopLine
 
 SHORTEST_LANE = 1e-3  # m; shorter ones only join others
+BROADEST = 50.0  # m, of a lane
 FARTHEST, WIDEST, LONGEST = 10_000, 30, 300  # km: from the origin, from side to side, all lanes together
 MOST_AHEAD, SIDE = 12.0, (-9.0, -1.0)  # m from a lane's end, ahead and to the left, where its post on a map may stand
 AFTER_LIMIT_CHANGE = 2.0  # m behind which the sign stands
@@ -46,6 +47,9 @@ def _require_town(lanes: dict[str, Lane]) -> None:
     """Raises ValueError with the reason where lanes are none to drive on, or more than memory holds."""
     if all(lane.internal for lane in lanes.values()):
         raise ValueError("it has no lane of type driving that is longer than a millimetre")
+    for lane in lanes.values():
+        if not 0 < lane.width <= BROADEST:
+            raise ValueError(f"its lane {lane.id} is {lane.width:g} m wide")
     points = np.concatenate([lane.line.points for lane in lanes.values()])
     if np.abs(points).max() > FARTHEST * 1000:
         raise ValueError(f"it has roads more than {FARTHEST} km from its origin")

@@ -45,7 +45,7 @@ def places_along(
 ) -> tuple[Points, Floats]:
     """Places (N, 2) so many metres beside the roadway, with random gaps between least and most of a spacing, and their
     headings (N,) away from the road."""
-    parts = []
+    parts = [(np.zeros((0, 2)), np.zeros(0))]  # a town may be too small for any
     for line in kerb_lines(roads, distance):
         s = np.cumsum(random_lengths(line.length - spacing[0] / 2, *spacing, rng))
         parts.append(chords(line, s, np.full(len(s), 0.4)))

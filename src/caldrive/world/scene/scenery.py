@@ -89,7 +89,7 @@ def _posts(roads: RoadNetwork, signs: Sequence[Sign]) -> Iterator[Prop]:
 
 def _plots(roads: RoadNetwork, layout: StreetLayout, rng: np.random.Generator) -> tuple[Points, Floats, Floats]:
     """Middles (N, 2) of the plots' street sides, headings (N,) away from the road, and frontages (N,) in m."""
-    parts = []
+    parts = [(np.zeros((0, 2)), np.zeros(0), np.zeros(0))]  # a town may be too small for any
     for line in kerb_lines(roads, SIDEWALK_WIDTH + SETBACK):
         width = random_lengths(line.length, *layout.frontage, rng)
         parts.append((*chords(line, np.cumsum(width) - width / 2, width / 2), width))

@@ -80,8 +80,8 @@ class GroundRaster:
 
 
 def _draw(polygons: list[tuple[shapely.Polygon, int]], low: Points) -> NDArray[np.int32]:
-    """A tile (rows, columns) from its lowest corner (2,) on, with each polygon's value where it lies, 0 elsewhere; later
-    ones lie on top."""
+    """A tile (rows, columns) from its lowest corner (2,) on, with each polygon's value where it lies, 0 elsewhere;
+    later ones lie on top."""
     canvas = PILImage.new("I", (TILE, TILE))
     brush = ImageDraw.Draw(canvas)
     for polygon, value in polygons:
