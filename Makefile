@@ -9,7 +9,7 @@ SHELL := /bin/bash
 MODEL := out/model
 RESULTS := out/results
 
-.PHONY: drive test lint docs coverage model results clean
+.PHONY: drive test lint docs coverage newest model results clean
 drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
@@ -32,6 +32,16 @@ coverage: $(READY)
 	core=$$($(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "ctrace")'); \
 	COVERAGE_CORE=$$core $(PYTEST) --cov --cov-report=term $(ARGS)
 	rm -f .coverage*
+
+# Every verb of the package with the newest libraries that pyproject.toml allows, in an environment of its own. PyTorch
+# stays the pinned one, which may be a CPU build.
+newest:
+	rm -rf out/newest
+	$(PYTHON) -m venv out/newest
+	out/newest/bin/pip install --quiet --disable-pip-version-check "$$(grep '^torch==' constraints.txt)"
+	out/newest/bin/pip install --quiet --disable-pip-version-check .
+	out/newest/bin/pip freeze
+	out/newest/bin/python scripts/every_verb.py
 
 # The pages in out/docs; a warning is an error. Nothing is fetched.
 docs: $(READY)
@@ -72,10 +82,12 @@ results: $(READY)
 		done; \
 	done
 
+# An environment that is there stays: it may hold PyTorch's CPU build, for the Python that it was made with.
+USED = $(or $(wildcard $(BIN)/python),$(PYTHON))
 $(READY): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
-		{ echo "Found $$($(PYTHON) --version), need Python 3.11 to 3.13: install one or run make PYTHON=/path/to/python3.11"; exit 1; }
-	$(PYTHON) -m venv .venv
+	@$(USED) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
+		{ echo "Found $$($(USED) --version), need Python 3.11 to 3.13: install one or run make PYTHON=/path/to/python3.11"; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,docs,test]'
 	touch $(READY)
 
