@@ -45,6 +45,13 @@ def caldrive_lines(page: Path) -> list[list[str]]:
     return [command[1:] for command in [*shown, *map(shlex.split, _uncommented(indented))] if command[0] == "caldrive"]
 
 
+def caldrive_spans(page: Path) -> list[list[str]]:
+    """The words behind `caldrive` of each whole command within a sentence; a verb alone is no command."""
+    spans = re.findall(r"(?<!`)`caldrive ([^`]+)`", page.read_text())
+    found = [span.split() for span in spans if "..." not in span]
+    return [words for words in found if len(words) > 1 and words[-1] != "--help" and words[0] != "speed"]
+
+
 def _uncommented(lines: list[str]) -> list[str]:
     return [line.partition(" #")[0] for line in lines]
 
