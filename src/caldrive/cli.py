@@ -23,7 +23,10 @@ from caldrive.commands import VERBS, Answer, command_type, verb_words
 from caldrive.config import from_toml
 from caldrive.progress import only_answers_on_stdout, progress_bar
 
-DESCRIPTION = "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller."
+DESCRIPTION = (
+    "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller. "
+    "caldrive --version says which caldrive this is."
+)
 FULL = (errno.ENOSPC, errno.EDQUOT)
 FAILED, STOPPED = 2, 130  # exit codes
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None

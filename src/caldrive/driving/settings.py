@@ -46,7 +46,7 @@ class DriveSettings(EpisodeSettings):
     episodes: int = 1
     """How many episodes, one for each route from --route on."""
     video: bool = True
-    """Film the drive; --no-video does not, and draws no speeds."""
+    """Film the drive and draw its speeds; --no-video does neither (in a file: video = false)."""
     out: Path = Path("out/drive")
     """Folder for drive.mp4, and for each episode its trace (JSON) and its speed over distance (PNG)."""
 
