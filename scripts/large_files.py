@@ -18,8 +18,12 @@ KNOWN = {"src/caldrive/models/cal.safetensors"}  # the network that ships
 
 
 def kept_files() -> list[str]:
-    """What git keeps here; nothing where this is no repository."""
+    """What git keeps here. Raises SystemExit where git does not say."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode != 0:
+        raise SystemExit(
+            f"found that git lists no files ({listed.stderr.strip()}), wanted a repository: name the files"
+        )
     return [name for name in listed.stdout.split("\0") if name]
 
 
@@ -34,8 +38,12 @@ def too_large(names: list[str], root: Path = ROOT) -> list[str]:
 
 
 def main() -> int:
-    sentences = too_large(sys.argv[1:] or kept_files())
-    print("\n".join(sentences) or "no file over 1 MB but the known ones")
+    if not sys.argv[1:] and not (ROOT / ".git").exists():
+        print("no repository, so nothing that it keeps for ever")
+        return 0
+    names = sys.argv[1:] or kept_files()
+    sentences = too_large(names)
+    print("\n".join(sentences) or f"{len(names)} files, none over 1 MB but the known ones")
     return int(bool(sentences))
 
 

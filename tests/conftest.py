@@ -35,12 +35,18 @@ def town(request: pytest.FixtureRequest) -> RoadNetwork:
 
 
 @pytest.fixture
-def fresh_worker() -> Iterator[None]:
+def no_sumo_left() -> Iterator[None]:
+    """The test leaves no SUMO running."""
+    yield
+    stop_sumo()
+
+
+@pytest.fixture
+def fresh_worker(no_sumo_left: None) -> Iterator[None]:
     """The test begins like a benchmark's new worker and leaves nothing running."""
     runner._worker.cache_clear()
     yield
     runner._worker.cache_clear()
-    stop_sumo()
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from caldrive.world.truth.labels import label
 
 CAR = VehicleConfig()
 POST_BEHIND_LINE = 6.6  # m from the stop line to the light's post: the bumper is there when the post leaves A1
-IMAGE = np.zeros((4, 4, 3), np.uint8)
+IMAGE = np.full((4, 4, 3), (200, 120, 40), np.uint8)
 
 
 def turn_route(radius: float, side: int, before: float = 40.0, after: float = 60.0) -> Points:

@@ -8,6 +8,7 @@ import pytest
 
 from caldrive.cli import main
 from caldrive.files import write_whole
+from tests.command_line import run_json
 
 DRIVE = ["drive", "--agent", "oracle", "--seconds", "1"]
 MISTAKES = {
@@ -92,6 +93,16 @@ def test_a_mistake_ends_in_one_sentence(mistake: str, folder: Path, capsys: pyte
     assert said.err.count("\n") == 1
     assert expected in said.err
     assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("mistake", ["unknown verb", "unknown option", "broken map"])
+def test_with_json_the_same_sentence_is_all_of_stdout(
+    mistake: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments, expected = MISTAKES[mistake]
+    answer = run_json(*(one.replace("{tmp}", str(folder)) for one in arguments), code=2)
+    assert [f"caldrive: {sentence}\n" for sentence in answer.values()] == [capsys.readouterr().err]
+    assert expected in answer["error"]
 
 
 def test_a_gpu_that_is_not_there_is_named(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -18,11 +17,11 @@ from caldrive.agents.registry import agent_entry
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.benchmark.suites import suite, to_json
-from caldrive.cli import main
 from caldrive.datatypes import CameraConfig
 from caldrive.visualization.hud import SIZE
-from caldrive.world.traffic.vehicles import stop_sumo
-from tests.commands.test_commands import run_json
+from tests.command_line import refusal, run_json, write_agent
+
+pytestmark = pytest.mark.usefixtures("no_sumo_left")
 
 CRUISER = """
 from caldrive import Control
@@ -32,27 +31,6 @@ class Cruiser:
         return Control(throttle=0.4 if observation.speed < 4.0 else 0.0)
 """
 DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "2", "--people", "3", "--seconds", "1"]
-
-
-@pytest.fixture(autouse=True)
-def nothing_left_running() -> Iterator[None]:
-    yield
-    stop_sumo()
-
-
-def write_agent(folder: Path, body: str, *, imports: str = "Affordances, CameraConfig, Control, Decision") -> str:
-    """A file with a class Own; returns what to type behind --agent. body: of the class, without its indentation."""
-    lines = "\n".join(f"    {line}" for line in body.splitlines())
-    (folder / "own.py").write_text(f"import numpy as np\nfrom caldrive import {imports}\n\nclass Own:\n{lines}\n")
-    return f"{folder / 'own.py'}:Own"
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The sentence with which a command ends."""
-    code = main(list(arguments))
-    printed = capsys.readouterr()
-    assert (code, printed.out, printed.err.count("\n")) == (2, "", 1)
-    return printed.err
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,9 @@ from typing import Any
 import pytest
 
 from caldrive.benchmark.suites import suite, to_json
-from caldrive.world.traffic.vehicles import stop_sumo
-from tests.agents.test_own_agents import refusal
-from tests.commands.test_commands import run_json
+from tests.command_line import refusal, run_json
+
+pytestmark = pytest.mark.usefixtures("no_sumo_left")
 
 DRIVE = ["drive", "--agent", "oracle", "--no-video", "--town", "town02", "--task", "straight", "--seconds", "3"]
 CLASS = """
@@ -27,12 +26,6 @@ class Careful:
         control = Control(throttle=0.4 if speed < self.speed else 0.0, steer=0.5 * affordances.relative_angle)
         return Decision(control, affordances, "careful", speed_limit=None, target_speed=3.6 * self.speed)
 """
-
-
-@pytest.fixture(autouse=True)
-def nothing_left_running() -> Iterator[None]:
-    yield
-    stop_sumo()
 
 
 def drive(controller: str, out: Path, *more: str) -> dict[str, list[Any]]:

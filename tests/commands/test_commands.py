@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
+import os
 import subprocess
 import sys
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -15,27 +14,21 @@ import numpy as np
 import pytest
 from rich.table import Table
 from rich.text import Text
+from scripts.every_verb import COMMANDS, words
 
 from caldrive.agents.settings import AgentSettings
-from caldrive.cli import _print, main
+from caldrive.cli import _print, main, parse
+from caldrive.commands import VERBS
 from caldrive.commands.answer import Answer
 from caldrive.datatypes import Command, Observation
-from caldrive.driving.determinism import EpisodeDigests, compare
+from caldrive.driving.determinism import Comparison, EpisodeDigests, compare
 from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.timing import Stopwatch
 from caldrive.visualization.hud import SIZE
+from tests.command_line import run_json
 
 DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]
 PREDICTED = ("hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance")
-
-
-def run_json(*arguments: str) -> dict[str, Any]:
-    """What a successful command prints with --json, which must be all that it prints."""
-    said = io.StringIO()
-    with redirect_stdout(said):
-        assert main([*arguments, "--json"]) == 0
-    found: dict[str, Any] = json.loads(said.getvalue())
-    return found
 
 
 @pytest.fixture(scope="session")
@@ -168,6 +161,22 @@ def test_two_fresh_processes_drive_the_same_bytes() -> None:
     found = run_json("determinism", "--agent", "oracle", "--town", "town02", "--seconds", "1")
     assert found["equal"]
     assert found["steps"] == 11
+
+
+def test_what_a_library_prints_is_not_in_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    def noisy(*_: object) -> Comparison:
+        os.write(1, b"from C\n")
+        print("from Python")
+        return Comparison(steps=7, difference="", digest="")
+
+    monkeypatch.setattr("caldrive.driving.determinism.check_determinism", noisy)
+    assert run_json("determinism")["steps"] == 7
+
+
+def test_every_verb_is_run_with_the_newest_libraries() -> None:
+    assert set(COMMANDS) == set(VERBS)
+    for verb, options in COMMANDS.items():
+        assert parse(words(f"{verb} {options}")).json
 
 
 def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import csv
-import io
-import json
-from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -18,14 +14,7 @@ from PIL import Image as Picture
 from caldrive.affordances import SPECS
 from caldrive.cli import main
 from caldrive.visualization.episode_video import VideoWriter
-
-
-def see_json(*arguments: str) -> dict[str, Any]:
-    printed = io.StringIO()
-    with redirect_stdout(printed):
-        assert main(["see", *arguments, "--json"]) == 0
-    answer: dict[str, Any] = json.loads(printed.getvalue())
-    return answer
+from tests.command_line import run_json
 
 
 def n_frames(path: str) -> tuple[int, float]:
@@ -45,7 +34,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_folder_becomes_a_video_and_a_table_with_a_row_for_each_picture(pictures: Path, tmp_path: Path) -> None:
-    answer = see_json(str(pictures), "--out", str(tmp_path / "seen" / "film.mp4"))
+    answer = run_json("see", str(pictures), "--out", str(tmp_path / "seen" / "film.mp4"))
     assert n_frames(answer["video"]) == (3, 10.0)
     assert answer["values"] == str(tmp_path / "seen" / "film.csv")
     with Path(answer["values"]).open() as file:
@@ -73,10 +62,12 @@ def test_a_fast_video_is_named_and_can_be_thinned_and_its_values_go_to_parquet(t
         for level in range(40, 100, 10):
             video.add(np.full((96, 200, 3), level, np.uint8))
     out, values = str(tmp_path / "film.mp4"), str(tmp_path / "values.parquet")
-    every = see_json(str(tmp_path / "own.mp4"), "--out", out, "--crop", "4:92")
+    every = run_json("see", str(tmp_path / "own.mp4"), "--out", out, "--crop", "4:92")
     assert n_frames(out) == (6, 30.0)
     assert "type --every 3" in every["notes"][-1]
-    third = see_json(str(tmp_path / "own.mp4"), "--out", out, "--values", values, "--every", "3", "--command", "left")
+    third = run_json(
+        "see", str(tmp_path / "own.mp4"), "--out", out, "--values", values, "--every", "3", "--command", "left"
+    )
     assert n_frames(out) == (2, 10.0)
     assert len(third["notes"]) == 1
     table = pq.read_table(values).to_pydict()

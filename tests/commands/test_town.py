@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +10,7 @@ import pytest
 from PIL import Image as Picture
 
 from caldrive.cli import main
-
-
-def town_json(*arguments: str) -> dict[str, Any]:
-    printed = io.StringIO()
-    with redirect_stdout(printed):
-        assert main(["town", *arguments, "--json"]) == 0
-    answer: dict[str, Any] = json.loads(printed.getvalue())
-    return answer
+from tests.command_line import run_json
 
 
 def size(path: str) -> tuple[int, int]:
@@ -41,7 +31,7 @@ def _plain_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_plain_sheet")
 def test_town_writes_its_sheet(tmp_path: Path) -> None:
-    answer = town_json("--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
+    answer = run_json("town", "--town", "town02", "--sheet", str(tmp_path / "a" / "town.png"), "--width", "160")
     assert (answer["width"], answer["height"]) == (160, 80)
     assert size(answer["sheet"]) == (160, 80)
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["town.png"]
@@ -50,12 +40,12 @@ def test_town_writes_its_sheet(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("_plain_sheet")
 def test_town_without_options_writes_the_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert town_json()["sheet"] == "out/town.png"
+    assert run_json("town")["sheet"] == "out/town.png"
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["town.png"]
 
 
 def test_town_writes_the_plan_alone_where_only_that_is_asked_for(tmp_path: Path) -> None:
-    answer = town_json("--town", "town02", "--plan", str(tmp_path / "plan.png"), "--width", "1100")
+    answer = run_json("town", "--town", "town02", "--plan", str(tmp_path / "plan.png"), "--width", "1100")
     assert (answer["plan_width"], answer["plan_height"]) == size(answer["plan"])
     assert answer["plan_width"] == 1100
     assert "sheet" not in answer
@@ -64,7 +54,7 @@ def test_town_writes_the_plan_alone_where_only_that_is_asked_for(tmp_path: Path)
 
 @pytest.mark.usefixtures("_plain_sheet")
 def test_town_writes_both(tmp_path: Path) -> None:
-    answer = town_json("--plan", str(tmp_path / "plan.png"), "--sheet", str(tmp_path / "sheet.png"))
+    answer = run_json("town", "--plan", str(tmp_path / "plan.png"), "--sheet", str(tmp_path / "sheet.png"))
     assert (answer["plan"], answer["sheet"]) == (str(tmp_path / "plan.png"), str(tmp_path / "sheet.png"))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.png", "sheet.png"]
 

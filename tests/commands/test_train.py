@@ -11,7 +11,8 @@ import pytest
 from caldrive.cli import main, parse
 from caldrive.perception.network.config import NETWORKS
 from caldrive.perception.training.config import TRAININGS, LossWeights
-from tests.commands.test_commands import DRIVE, run_json
+from tests.command_line import run_json
+from tests.commands.test_commands import DRIVE
 
 
 def parsed(*options: str) -> Any:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import io
-import json
 import math
-from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
 
-from caldrive.cli import main
 from caldrive.driving.choice import OWN_TASK, chosen_scenarios, parse_place
 from caldrive.driving.settings import EpisodeSettings
 from caldrive.driving.tasks import task_scenarios
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
+from tests.command_line import run_json
 
 # In town01 cars drive to the north at x = 132 and to the south at x = 128.
 SOUTH, NORTH = -math.pi / 2, math.pi / 2
@@ -97,11 +94,8 @@ def test_in_a_world_without_a_map_the_car_starts_towards_its_goal() -> None:
 
 
 def test_ones_own_places_are_driven(tmp_path: Path) -> None:
-    printed = io.StringIO()
-    places = ["--from", "128,215", "--to", "128,175"]
-    with redirect_stdout(printed):
-        assert main(["drive", "--agent", "oracle", *places, "--no-video", "--out", str(tmp_path), "--json"]) == 0
-    [episode] = json.loads(printed.getvalue())["episodes"]
+    places = ("--from", "128,215", "--to", "128,175")
+    [episode] = run_json("drive", "--agent", "oracle", *places, "--no-video", "--out", str(tmp_path))["episodes"]
     assert episode["outcome"] == "success"
     assert episode["scenario"]["task"] == OWN_TASK
     assert episode["distance"] == pytest.approx(40, abs=8)

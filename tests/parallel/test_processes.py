@@ -12,18 +12,7 @@ from pathlib import Path
 import pytest
 
 from caldrive.parallel.processes import parallel_map
-
-
-def _square(k: int) -> int:
-    return k * k
-
-
-def _dies_at_first(folder: Path, k: int) -> int:
-    mark = folder / f"died-{k}"
-    if k % 3 == 1 and not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return k * k
+from tests.parallel.work import dies_at_first, fails, square
 
 
 def _dies(k: int) -> int:
@@ -31,17 +20,13 @@ def _dies(k: int) -> int:
     return k
 
 
-def _fails(k: int) -> int:
-    raise ValueError(f"found {k}")
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 def test_all_work_is_done_once(workers: int) -> None:
-    assert sorted(parallel_map(_square, range(7), workers)) == [(k, k * k) for k in range(7)]
+    assert sorted(parallel_map(square, range(7), workers)) == [(k, k * k) for k in range(7)]
 
 
 def test_the_work_of_workers_that_die_is_done_again(tmp_path: Path) -> None:
-    assert sorted(parallel_map(partial(_dies_at_first, tmp_path), range(6), 2)) == [(k, k * k) for k in range(6)]
+    assert sorted(parallel_map(partial(dies_at_first, tmp_path), range(6), 2)) == [(k, k * k) for k in range(6)]
     assert len(list(tmp_path.iterdir())) == 2
 
 
@@ -53,7 +38,7 @@ def test_workers_that_always_die_are_given_up() -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_error_in_the_work_ends_it(workers: int) -> None:
     with pytest.raises(ValueError, match="found 0"):
-        list(parallel_map(_fails, [0], workers))
+        list(parallel_map(fails, [0], workers))
 
 
 def _marks(folder: Path, k: int) -> int:

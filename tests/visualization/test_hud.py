@@ -23,6 +23,7 @@ from caldrive.datatypes import (
 )
 from caldrive.visualization.gauges import AMBER, BAR_LEFT, BAR_RIGHT, GREEN, LEFT, TEXT, TRUE, VALUE
 from caldrive.visualization.hud import CAMERA, HEADER, OTHER_STATE, PANEL, SIGN, SIZE, STATES, Hud
+from tests.visualization.pixels import count
 
 VIEW = np.full((CAMERA.height, CAMERA.width, 3), 200, np.uint8)
 WHOLE = Decision(Control(throttle=0.5), Affordances(vehicle_distance=10.0), DriveState.FOLLOWING, 60.0, 33.0, "a note")
@@ -36,10 +37,6 @@ def frame(decision: Decision | None, truth: bool = False) -> Image:
     true = Truth(1.0, ego, Affordances(vehicle_distance=25.0))
     step = Step(observation, true, Control(throttle=0.5), decision)
     return Hud("a drive", 60.0, None, truth).draw(VIEW, step, [])
-
-
-def count(image: Image, color: tuple[int, int, int]) -> int:
-    return int((image == color).all(-1).sum())
 
 
 def panel(image: Image, left: float, right: float) -> Image:

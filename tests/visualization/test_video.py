@@ -35,6 +35,7 @@ from caldrive.visualization.hud import CAMERA, PANEL, SIZE, Hud, with_outcome
 from caldrive.visualization.minimap import EGO, GOAL, ROUTE, MiniMap
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
+from tests.visualization.pixels import count
 
 SCENARIO = task_scenarios("town02", "one-turn", 14)[0]
 VIEW = np.full((CAMERA.height, CAMERA.width, 3), 200, np.uint8)
@@ -59,11 +60,6 @@ def step(
 def panel(minimap: MiniMap, step: Step, truth: bool = False) -> Image:
     """The part under the camera's picture, left of the map."""
     return Hud("a drive", 60.0, minimap, truth).draw(VIEW, step, [])[CAMERA.height :, :MAP_LEFT]
-
-
-def count(image: Image, color: tuple[int, int, int]) -> int:
-    """Pixels of exactly a colour."""
-    return int((image == color).all(-1).sum())
 
 
 def read(path: Path) -> tuple[list[Image], float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
 from contextlib import closing
 
 import numpy as np
@@ -13,16 +12,11 @@ from caldrive.datatypes import CameraConfig, Control, Image, Truth
 from caldrive.scenarios import Scenario
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads.towns import load_roads
-from caldrive.world.traffic.vehicles import stop_sumo
+
+pytestmark = pytest.mark.usefixtures("no_sumo_left")
 
 CAMERA = CameraConfig(width=100, height=44)
 FORWARD = Control(throttle=0.5)
-
-
-@pytest.fixture(autouse=True)
-def _no_sumo_is_left() -> Iterator[None]:
-    yield
-    stop_sumo()
 
 
 def straight_on(town: str, cars: int = 0, weather: int = 1) -> Scenario:

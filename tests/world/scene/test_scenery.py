@@ -23,7 +23,7 @@ def footprints(props: tuple[Prop, ...], kind: str) -> np.ndarray:
     return np.array([shapely.Polygon(box_corners(p.pose, p.length, p.width)) for p in props if p.kind == kind])
 
 
-def test_the_same_town_gets_the_same_scenery(town: tuple[RoadNetwork, tuple[Prop, ...]]) -> None:
+def test_scenery_built_again_is_the_same(town: tuple[RoadNetwork, tuple[Prop, ...]]) -> None:
     roads = town[0]
     again = build_scenery(roads, roads.signs, TOWN_APPEARANCES[roads.appearance])
     assert again == town[1]

@@ -12,5 +12,5 @@ def test_layers_stand_in_the_order_of_their_names() -> None:
     assert red[2, 2, 0] > red[2, 2, 1] + 100  # the sign's corner is as red as its ring
 
 
-def test_every_process_draws_the_same_layers() -> None:
+def test_layers_drawn_again_are_the_same() -> None:
     assert (texture_layers() == texture_layers()).all()
