@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.glob("*.md"), *DOCS.glob("own/*.md")])
 FENCE = re.compile(r"^( *)```(\w+)(?: title=\"(.+?)\")?\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
-SECONDS = 1.0  # of a drive that a page shows
+SECONDS = 0.3  # of a drive that a page shows
 SHORT_SUITE = "short.json"
 
 
