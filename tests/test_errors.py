@@ -53,6 +53,10 @@ MISTAKES = {
         ["benchmark", "--agent", "bob", "--out", "{tmp}/new"],
         "wanted one of cal, oracle",
     ),
+    "no such time limit, in a suite": (
+        ["benchmark", "--time-limit", "long", "--out", "{tmp}/new"],
+        "type --time-limit paper",
+    ),
     "a negative seed, in a suite": (["benchmark", "--seed", "-1", "--out", "{tmp}/new"], "type --seed 0"),
     "no such model, in a suite": (["benchmark", "--model", "{tmp}/gone.safetensors", "--out", "{tmp}/new"], "gone"),
     "no known benchmark": (["benchmark", "--known", "{tmp}", "--out", "{tmp}/new"], "found no run.json in"),

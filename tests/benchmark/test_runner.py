@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from caldrive.benchmark import run_folder
-from caldrive.benchmark.artifacts import read_trace, trace_path
+from caldrive.benchmark.artifacts import read_trace, still_paths, trace_path
 from caldrive.benchmark.replay import replay
 from caldrive.benchmark.result_lines import read_lines
 from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, suite_digest, trial_result
 from caldrive.benchmark.runner import benchmark
 from caldrive.benchmark.settings import BenchmarkSettings
-from caldrive.benchmark.suites import suite, to_json
+from caldrive.benchmark.suites import from_json, suite, to_json
 from caldrive.datatypes import Pose
 from caldrive.files import locked_folder
 from caldrive.provenance import code_version
@@ -105,10 +105,37 @@ def test_an_episode_driven_again_goes_as_before(whole: BenchmarkSettings, tmp_pa
         replay(whole.out, "x", tmp_path / "other.mp4")
 
 
-def test_results_that_nothing_says_whose_they_are_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
-    (tmp_path / "results.jsonl").touch()
+@pytest.mark.parametrize("name", ["results.jsonl", "results.jsonl.gz"])
+def test_results_that_nothing_says_whose_they_are_are_refused(
+    name: str, whole: BenchmarkSettings, tmp_path: Path
+) -> None:
+    content = (whole.out / name).read_bytes() if name == "results.jsonl" else gzip.compress(b"nonsense\n")
+    (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=r"no run\.json that says whose"):
         next(benchmark(replace(whole, out=tmp_path)))
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_folder_in_which_nothing_was_driven_is_free_for_another_run(whole: BenchmarkSettings, tmp_path: Path) -> None:
+    (tmp_path / "agent.py").write_text("class Own:\n    def __init__(self):\n        raise KeyError(3)\n")
+    out = tmp_path / "out"
+    with pytest.raises(ValueError, match="Own cannot be made"):
+        next(benchmark(replace(whole, agent=f"{tmp_path / 'agent.py'}:Own", out=out)))
+    (out / "results.jsonl").write_bytes(b'{"key": "tow')  # killed while writing its first line
+    (trial, *_) = suite(whole.suite)
+    (out / "stills").mkdir()
+    (out / "stills" / f"{trial.key}-3.jpg").touch()
+    assert next(benchmark(replace(whole, out=out))).done == 1
+    assert RunFolder(out).description["agent"] == "oracle"
+    assert len(still_paths(out, trial.key)) == len(still_paths(whole.out, trial.key))
+
+
+def test_lines_that_are_compressed_are_not_hidden_by_a_new_one(whole: BenchmarkSettings, folder: RunFolder) -> None:
+    first_three = b"".join((whole.out / "results.jsonl").read_bytes().splitlines(keepends=True)[:3])
+    (folder.path / "results.jsonl.gz").write_bytes(gzip.compress(first_three))
+    again = replace(whole, out=folder.path)
+    assert [state.done for state in benchmark(again)] == [4]
+    assert lines(again) == lines(whole)
 
 
 def test_two_at_once_are_refused(whole: BenchmarkSettings, tmp_path: Path) -> None:
@@ -225,7 +252,10 @@ def test_a_suite_that_has_changed_since_is_refused(whole: BenchmarkSettings, tmp
     trials = suite(whole.suite)
     elsewhere = replace(trials[0], key="x", scenario=replace(trials[0].scenario, town=str(town)))
     path.write_text(to_json([*trials, elsewhere]))
-    about = RunFolder(whole.out).description | {"suite": str(path), "suite_content": suite_digest(path)}
+    about = RunFolder(whole.out).description | {
+        "suite": str(path),
+        "suite_content": suite_digest(path, from_json(path)),
+    }
     (tmp_path / "run.json").write_text(json.dumps(about))
     assert len(RunFolder(tmp_path).trials) == len(trials) + 1
     shorter = to_json(trials[:1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import gzip
 import zlib
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -56,9 +57,14 @@ class EpisodeArtifacts:
         stills = list(self.stills)
         if result.outcome in (Outcome.TIMEOUT, Outcome.ABORTED) and len(stills) < MAX_STILLS:
             stills.append(self._still())
-        trace = {str(trace_path(Path(), key)): gzip.compress(episode_json(result, self.trace), mtime=0)}
-        pictures = (simplejpeg.encode_jpeg(still, **JPEG) for still in stills)
-        return trace | {f"stills/{key}-{k}.jpg": picture for k, picture in enumerate(pictures)}
+        pictures = [simplejpeg.encode_jpeg(still, **JPEG) for still in stills]
+        return artifact_files(key, episode_json(result, self.trace), pictures)
+
+
+def artifact_files(key: str, episode: bytes, stills: Iterable[bytes]) -> dict[str, bytes]:
+    """A trial's trace and stills by their names in a run's folder. episode: the trace as JSON; stills: JPEGs."""
+    trace = {str(trace_path(Path(), key)): gzip.compress(episode, mtime=0)}
+    return trace | {f"stills/{key}-{k}.jpg": still for k, still in enumerate(stills)}
 
 
 def trace_path(folder: Path, key: str) -> Path:

@@ -41,9 +41,7 @@ def read_lines(folder: Path) -> ResultLines:
 
     Raises ValueError where a compressed file cannot be unpacked.
     """
-    path = folder / RESULTS
-    if not path.is_file() and (folder / COMPRESSED).is_file():
-        path = folder / COMPRESSED
+    path = folder / (COMPRESSED if _is_compressed(folder) else RESULTS)
     lines, damaged = dict[str, dict[str, Any]](), []
     for number, text in enumerate(_content(path).split(b"\n")[:-1], start=1):
         try:
@@ -54,6 +52,10 @@ def read_lines(folder: Path) -> ResultLines:
         except ValueError as error:
             damaged.append(f"line {number} of {path} is damaged ({error})")
     return ResultLines(lines, tuple(damaged))
+
+
+def _is_compressed(folder: Path) -> bool:
+    return (folder / COMPRESSED).is_file() and not (folder / RESULTS).is_file()
 
 
 def _content(path: Path) -> bytes:
@@ -77,12 +79,18 @@ def _read_line(text: bytes) -> dict[str, Any]:
     return dict(line)
 
 
-def drop_damaged(folder: Path) -> tuple[str, ...]:
-    """Writes the lines again without those that are damaged, whose episodes are then driven again; says which."""
+def has_lines(folder: Path) -> bool:
+    """Whether there is any line, sound or damaged."""
     lines = read_lines(folder)
-    if lines.damaged:
+    return bool(lines.by_trial or lines.damaged)
+
+
+def make_appendable(folder: Path) -> None:
+    """Writes results.jsonl again where it has damaged lines, whose episodes are then driven again, and where there is
+    only the compressed file, whose lines a new results.jsonl would hide."""
+    lines = read_lines(folder)
+    if lines.damaged or _is_compressed(folder):
         write_whole(folder / RESULTS, b"".join(map(json_line, lines.by_trial.values())))
-    return lines.damaged
 
 
 def append_line(folder: Path, values: dict[str, Any]) -> None:

@@ -3,13 +3,12 @@ navigation tasks, and a trial of the traffic school is one of NoCrash's that mor
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from caldrive.benchmark.artifacts import read_trace_file, still_paths, trace_path
+from caldrive.benchmark.artifacts import artifact_files, read_trace_file, still_paths, trace_path
 from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder
 from caldrive.benchmark.suites import Trial
 from caldrive.files import json_line
@@ -69,6 +68,4 @@ def _files(folder: Path, line: dict[str, Any], trial: Trial) -> dict[str, bytes]
     """The episode's trace and stills under their new names."""
     key = line["key"]
     values = read_trace_file(trace_path(folder, key)) | {"result": _with_task(line["result"], trial)}
-    trace = {str(trace_path(Path(), trial.key)): gzip.compress(json_line(values), mtime=0)}
-    stills = enumerate(still_paths(folder, key))
-    return trace | {f"stills/{trial.key}-{k}.jpg": path.read_bytes() for k, path in stills}
+    return artifact_files(trial.key, json_line(values), [path.read_bytes() for path in still_paths(folder, key)])

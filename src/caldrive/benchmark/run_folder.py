@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -15,8 +16,8 @@ from typing import Any, NotRequired, TypedDict
 
 from caldrive.agents.registry import provenance
 from caldrive.agents.settings import AgentSettings
-from caldrive.benchmark.artifacts import read_trace_file, trace_path
-from caldrive.benchmark.result_lines import RESULTS, append_line, drop_damaged, read_lines
+from caldrive.benchmark.artifacts import read_trace_file, still_paths, trace_path
+from caldrive.benchmark.result_lines import append_line, has_lines, make_appendable, read_lines
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import SUITES, Trial, TrialResult, from_json, suite
 from caldrive.files import read_json, write_whole
@@ -68,19 +69,19 @@ def driver_provenance(driver: AgentSettings) -> dict[str, Any]:
     return {"code": code_version(), **provenance(driver)}
 
 
-def suite_digest(path: Path) -> str:
-    """A digest of a suite of one's own: of its file, and of the maps that it drives in."""
-    maps = sorted({trial.scenario.town for trial in from_json(path)} - set(TOWNS))
+def suite_digest(path: Path, trials: Sequence[Trial]) -> str:
+    """A digest of a suite of one's own: of its file, and of the maps that its trials drive in."""
+    maps = sorted({trial.scenario.town for trial in trials} - set(TOWNS))
     content = b"".join(part.read_bytes() for part in (path, *map(Path, maps)))
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def run_identity(settings: BenchmarkSettings, driven_by: dict[str, Any]) -> dict[str, Any]:
-    """What a folder's results depend on. driven_by: the `driver_provenance` of this process."""
+def run_identity(settings: BenchmarkSettings, trials: Sequence[Trial], driven_by: dict[str, Any]) -> dict[str, Any]:
+    """What a folder's results depend on. trials: the suite's; driven_by: the `driver_provenance` of this process."""
     own_suite, driver = Path(settings.suite) if settings.suite not in SUITES else None, settings.driver
     return {
         "suite": str(own_suite.resolve()) if own_suite else settings.suite,
-        "suite_content": suite_digest(own_suite) if own_suite else None,
+        "suite_content": suite_digest(own_suite, trials) if own_suite else None,
         "agent": driver.agent, "controller": driver.controller, "cap": driver.cap,
         "time_limit": settings.time_limit, "seed": settings.seed, **driven_by,
     }  # fmt: skip
@@ -95,26 +96,23 @@ class RunFolder:
         self.description: dict[str, Any] = _read_description(path)
 
     @classmethod
-    def claim(cls, settings: BenchmarkSettings, driven_by: dict[str, Any]) -> RunFolder:
-        """The folder for settings' results, new or taken up again. Raises ValueError where it holds another run's."""
-        path, identity = settings.out, run_identity(settings, driven_by)
-        if not (path / RUN).is_file():
-            if (path / RESULTS).is_file():
-                raise ValueError(f"found results in {path}, but no {RUN} that says whose: give another --out")
-            more = {
-                "model_file": str(settings.model.resolve()) if settings.model else None,
-                "began": datetime.now(UTC).isoformat(timespec="seconds"),
-                "machine": machine_name(), "workers": settings.workers,
-            }  # fmt: skip
-            write_whole(path / RUN, (json.dumps(identity | more, indent=2) + "\n").encode())
+    def claim(cls, settings: BenchmarkSettings, trials: list[Trial], driven_by: dict[str, Any]) -> RunFolder:
+        """The folder for settings' results, new or taken up again. trials: the suite's. Raises ValueError where it
+        holds another run's."""
+        path, identity = settings.out, run_identity(settings, trials, driven_by)
+        if not has_lines(path):  # what was tried here before, if anything, came to nothing
+            _write_description(settings, identity)
+        elif not (path / RUN).is_file():
+            raise ValueError(f"found results in {path}, but no {RUN} that says whose: give another --out")
         folder = cls(path)
+        folder.trials = trials
         for name, value in identity.items():
             if folder.description.get(name) != value:
                 raise ValueError(
                     f"found in {path} results with {name} {folder.description.get(name)}, wanted {value}: "
                     "give another --out"
                 )
-        drop_damaged(path)
+        make_appendable(path)
         return folder
 
     @property
@@ -129,7 +127,7 @@ class RunFolder:
         """The suite's trials. Raises ValueError where the file of a suite of one's own is not what it was."""
         about = self.description
         if about["suite_content"] is not None:
-            _require_same_suite(Path(about["suite"]), about["suite_content"])
+            return _own_trials(Path(about["suite"]), about["suite_content"])
         return suite(about["suite"], about["seed"], about["time_limit"])
 
     def lines(self) -> dict[str, dict[str, Any]]:
@@ -173,9 +171,20 @@ class RunFolder:
                     f"found a worker with {name} {value}, wanted {self.description.get(name)}: "
                     "install the same caldrive and model on machines of one kind"
                 )
+        for left_over in still_paths(self.path, record.line["key"]):  # of a run that was killed before its first line
+            left_over.unlink()
         for name, content in record.files.items():
             write_whole(self.path / name, content)
         append_line(self.path, record.line)
+
+
+def _write_description(settings: BenchmarkSettings, identity: dict[str, Any]) -> None:
+    more = {
+        "model_file": str(settings.model.resolve()) if settings.model else None,
+        "began": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": machine_name(), "workers": settings.workers,
+    }  # fmt: skip
+    write_whole(settings.out / RUN, (json.dumps(identity | more, indent=2) + "\n").encode())
 
 
 def _changed(folder: Path, key: str, line: dict[str, Any]) -> bool:
@@ -206,9 +215,11 @@ def _read_description(folder: Path) -> dict[str, Any]:
         ) from error
 
 
-def _require_same_suite(path: Path, digest: str) -> None:
+def _own_trials(path: Path, digest: str) -> list[Trial]:
+    """The trials of a suite of one's own. Raises ValueError where its file, or a map, is not what it was."""
     try:
-        now = suite_digest(path)
+        trials = from_json(path)
+        now = suite_digest(path, trials)
     except (ValueError, OSError) as error:
         now = str(error)
     if now != digest:
@@ -216,3 +227,4 @@ def _require_same_suite(path: Path, digest: str) -> None:
             f"found that {path} or a map in it is not what was driven ({now}), wanted "
             f"{digest}: put it back, or type caldrive benchmark --out ANOTHER"
         )
+    return trials

@@ -87,11 +87,11 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[RunProgress]:
     workers keep dying or Ray is missing.
     """
     known = [RunFolder(folder) for folder in settings.known]
-    _check(settings)
+    trials = _checked_trials(settings)
     driven_by = driver_provenance(settings.driver)  # looks at agent and network before there is a folder
     with locked_folder(settings.out):
-        folder = RunFolder.claim(settings, driven_by)
-        for record in reusable_records(known, folder.missing(), folder.description | driven_by):
+        folder = RunFolder.claim(settings, trials, driven_by)
+        for record in reusable_records(known, folder.missing(), folder.description):
             folder.save(record)
         missing = folder.missing()
         done = len(folder.trials) - len(missing)
@@ -105,21 +105,23 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[RunProgress]:
             _close_worker(settings.driver)
 
 
-def _check(settings: BenchmarkSettings) -> None:
-    """Refuses what no benchmark can be made of before a folder is claimed."""
+def _checked_trials(settings: BenchmarkSettings) -> list[Trial]:
+    """The suite's trials. Refuses what no benchmark can be made of before a folder is claimed."""
     require_within("--workers", settings.workers, 1, MOST_WORKERS, 2)
     require_within("--seed", settings.seed, 0, MOST_SEED, 0)
     if settings.ray is not None:
         require_ray()
     if settings.cap is not None:
         require_within("--cap", settings.cap, 1.0, 200.0, 20)
-    if settings.suite not in SUITES:
-        if (settings.seed, settings.time_limit) != (0, "paper"):
-            raise ValueError(
-                f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
-            )
-        _check_trials(settings.suite, suite(settings.suite))
+    if settings.suite not in SUITES and (settings.seed, settings.time_limit) != (0, "paper"):
+        raise ValueError(
+            f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
+        )
     require_writable_folder(settings.out)
+    trials = suite(settings.suite, settings.seed, settings.time_limit)
+    if settings.suite not in SUITES:
+        _check_trials(settings.suite, trials)
+    return trials
 
 
 def _check_trials(name: str, trials: list[Trial]) -> None:

@@ -116,7 +116,7 @@ def task_scenarios(
     where it is called something else. Raises ValueError for an unknown task or time limit.
     """
     if time_limit not in ("paper", "code"):
-        raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: give time_limit='paper'")
+        raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: type --time-limit paper")
     usual = USUAL_TRAFFIC.get(town, OTHER_TOWNS_TRAFFIC) if task == "navigation-dynamic" else (0, 0)
     return [
         Scenario(
