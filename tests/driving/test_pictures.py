@@ -49,6 +49,18 @@ def test_a_video_gives_its_frames_with_their_times(tmp_path: Path) -> None:
     assert len(list(source)) == 3  # it can be read again
 
 
+def test_pictures_that_are_left_out_are_not_read(tmp_path: Path) -> None:
+    for number in range(5):
+        Picture.fromarray(halves()).save(tmp_path / f"{number}.png")
+    for number in (1, 3):
+        (tmp_path / f"{number}.png").write_bytes(b"damaged")
+    source = open_source(tmp_path, every=2)
+    assert [picture.number for picture in source] == [0, 2, 4]
+    assert source.count == 5
+    frames = open_source(film(tmp_path / "film.mp4", n=5), every=3)
+    assert [(picture.number, picture.time) for picture in frames] == [(0, 0.0), (3, pytest.approx(0.15))]
+
+
 def test_one_picture_is_a_source_of_one(tmp_path: Path) -> None:
     Picture.fromarray(halves()).save(tmp_path / "one.png")
     assert [picture.file for picture in open_source(tmp_path / "one.png")] == ["one.png"]

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Protocol
 
@@ -31,7 +32,12 @@ class SourcePicture:
 
 
 class PictureSource(Protocol):
-    """Pictures in their order."""
+    """Pictures in their order: the first one, and from there every so many-th."""
+
+    @property
+    def every(self) -> int:
+        """How many pictures from one that is given to the next; those between are not looked at."""
+        ...
 
     @property
     def name(self) -> str:
@@ -40,12 +46,12 @@ class PictureSource(Protocol):
 
     @property
     def rate(self) -> float:
-        """Pictures a second."""
+        """Pictures a second, of all."""
         ...
 
     @property
     def count(self) -> int | None:
-        """How many there are, None where that is not known."""
+        """How many there are in all, None where that is not known."""
         ...
 
     def __iter__(self) -> Iterator[SourcePicture]: ...
@@ -56,11 +62,11 @@ class PictureFolder:
 
     rate = USUAL_RATE
 
-    def __init__(self, name: str, files: list[Path]) -> None:
-        self.name, self.files, self.count = name, sorted(files, key=_natural), len(files)
+    def __init__(self, name: str, files: list[Path], every: int = 1) -> None:
+        self.name, self.files, self.every, self.count = name, sorted(files, key=_natural), every, len(files)
 
     def __iter__(self) -> Iterator[SourcePicture]:
-        for number, file in enumerate(self.files):
+        for number, file in islice(enumerate(self.files), 0, None, self.every):
             yield SourcePicture(number, file.name, number / self.rate, _read_picture(file))
 
 
@@ -82,8 +88,8 @@ def _read_picture(file: Path) -> Image:
 class VideoFile:
     """The frames of a video's first picture stream, upright. Raises ValueError where a file is no video."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.name = path, path.name
+    def __init__(self, path: Path, every: int = 1) -> None:
+        self.path, self.name, self.every = path, path.name, every
         with self._opened() as container:
             if not container.streams.video:
                 raise ValueError(f"found no pictures in {path}, wanted a video: give another file")
@@ -93,7 +99,7 @@ class VideoFile:
 
     def __iter__(self) -> Iterator[SourcePicture]:
         with self._opened() as container:
-            for number, frame in enumerate(container.decode(video=0)):
+            for number, frame in islice(enumerate(container.decode(video=0)), 0, None, self.every):
                 image: Image = frame.to_ndarray(format="rgb24").astype(np.uint8, copy=False)
                 time = frame.time if frame.time is not None else number / self.rate
                 yield SourcePicture(number, "", time, _upright(image, getattr(frame, "rotation", 0)))
@@ -115,8 +121,8 @@ def _upright(image: Image, degrees: int) -> Image:
     return np.ascontiguousarray(np.rot90(image, round(degrees / 90)))
 
 
-def open_source(path: Path) -> PictureSource:
-    """The pictures of a video, of a folder, or of one picture's file.
+def open_source(path: Path, every: int = 1) -> PictureSource:
+    """The pictures of a video, of a folder, or of one picture's file: every so many-th.
 
     Raises FileNotFoundError where there is nothing, ValueError where there is no picture in it.
     """
@@ -124,7 +130,7 @@ def open_source(path: Path) -> PictureSource:
         files = [file for file in path.iterdir() if file.suffix.lower() in ENDINGS and not file.name.startswith(".")]
         if not files:
             raise ValueError(f"found no picture in {path}, wanted files that end in {', '.join(ENDINGS)}: give another")
-        return PictureFolder(path.resolve().name, files)
+        return PictureFolder(path.resolve().name, files, every)
     if not path.is_file():
         raise FileNotFoundError(f"found nothing at {path}, wanted a video or a folder of pictures: check the path")
-    return PictureFolder(path.name, [path]) if path.suffix.lower() in ENDINGS else VideoFile(path)
+    return PictureFolder(path.name, [path]) if path.suffix.lower() in ENDINGS else VideoFile(path, every)

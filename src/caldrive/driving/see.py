@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import asdict, dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -65,20 +64,16 @@ def see(settings: SeeSettings, progress: Progress = silent) -> SeeReport:
     _check_outputs(settings, values)
     require_within("--every", settings.every, 1, 1_000_000, 1)
     crop = None if settings.crop is None else parse_crop(settings.crop)
-    source = open_source(settings.source)
+    source = open_source(settings.source, settings.every)
     network = NetworkPerception(model_path(settings.model))
     size = network.network.config.image_width, network.network.config.image_height
     viewer = Viewer(network, size, Command(settings.command), crop)
-    with VideoWriter(settings.out, rate=source.rate / settings.every) as video:
-        rows = _film(video, source, viewer, settings.every, progress)
+    with VideoWriter(settings.out, rate=source.rate / source.every) as video:
+        rows = _film(video, source, viewer, progress)
         if not rows:
             raise ValueError(f"found no picture in {settings.source}, wanted one at least: give another file")
         write_whole(values, _content(rows, values.suffix.lower()))  # within the block: without values there is no video
-    notes = (
-        f"{WARNING}: in other pictures its values may mean nothing",
-        *viewer.notes,
-        *_rate_notes(source, settings.every),
-    )
+    notes = (f"{WARNING}: in other pictures its values may mean nothing", *viewer.notes, *_rate_notes(source))
     return SeeReport(settings.out, values, len(rows), sum(bool(row["note"]) for row in rows), notes)
 
 
@@ -95,14 +90,12 @@ def _check_outputs(settings: SeeSettings, values: Path) -> None:
         raise ValueError(f"found that --out {settings.out} is the video to look at, wanted another name: give one")
 
 
-def _film(
-    video: VideoWriter, source: PictureSource, viewer: Viewer, every: int, progress: Progress
-) -> list[dict[str, Any]]:
-    """Adds every so many-th picture to the video; returns the values, one row for each."""
+def _film(video: VideoWriter, source: PictureSource, viewer: Viewer, progress: Progress) -> list[dict[str, Any]]:
+    """Adds the pictures to the video; returns the values, one row for each."""
     frames = SeenFrames(f"{source.name[:LONGEST_NAME]}   {WARNING}", viewer.command)
     rows = []
     of = f" of 0-{source.count - 1}" if source.count else ""  # numbered from 0, as in the values
-    for picture in islice(source, 0, None, every):
+    for picture in source:
         label = f"{picture.number}{of}"
         progress(f"picture {label}", min(1.0, picture.number / source.count) if source.count else 0.0)
         seen = viewer.look(picture, label)
@@ -174,14 +167,14 @@ def parse_crop(text: str) -> tuple[int, int]:
     return int(first), int(end)
 
 
-def _rate_notes(source: PictureSource, every: int) -> tuple[str, ...]:
+def _rate_notes(source: PictureSource) -> tuple[str, ...]:
     """Says so where the pictures come much faster or slower than those that the network learnt with: it looks back."""
-    rate = source.rate / every
+    rate = source.rate / source.every
     if 1 / RATE_FAR_OFF < rate / USUAL_RATE < RATE_FAR_OFF:
         return ()
     text = f"it looks at {rate:.3g} pictures a second, and learnt at {USUAL_RATE:.0f}"
     fitting = round(source.rate / USUAL_RATE)
-    return (f"{text}: type --every {fitting}" if fitting > 1 and fitting != every else text,)
+    return (f"{text}: type --every {fitting}" if fitting > 1 and fitting != source.every else text,)
 
 
 def _row(picture: SourcePicture, seen: SeenPicture) -> dict[str, Any]:
