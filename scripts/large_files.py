@@ -2,8 +2,8 @@
 
     python scripts/large_files.py [FILE ...]
 
-Without names it looks at all files that git keeps. Reports and recordings are made, not committed; lines of results are
-compressed; the network's file is committed once a release.
+Without names it looks at all files that git keeps. HTML reports and recordings are made, not committed;
+lines of results are compressed; the network's file is committed once a release.
 """
 
 from __future__ import annotations

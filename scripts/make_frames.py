@@ -206,10 +206,10 @@ def angle(axes: Axes, at: Pose, radius: float, first: float, last: float, color:
 
 def draw_signs(axes: Axes) -> None:
     lane = bend(26.0, 8.0, 18.0)
-    for left, style in ((HALF, {"dashes": (7, 5), "color": "#b7bec7"}), (-HALF, {"color": "#b9b3a6"})):
-        edge = [moved(lane.pose_at(s), left=left) for s in np.linspace(0, lane.length, 80)]
-        axes.plot([p.x for p in edge], [p.y for p in edge], lw=2.2, zorder=0.5, **style)
     sides = [[moved(lane.pose_at(s), left=side) for s in np.linspace(0, lane.length, 80)] for side in (HALF, -HALF)]
+    styles: tuple[dict[str, Any], ...] = ({"dashes": (7, 5), "color": "#b7bec7"}, {"color": "#b9b3a6"})
+    for side, style in zip(sides, styles, strict=True):
+        axes.plot([p.x for p in side], [p.y for p in side], lw=2.2, zorder=0.5, **style)
     axes.add_patch(Polygon([(p.x, p.y) for p in (*sides[0], *reversed(sides[1]))], color=ASPHALT, lw=0, zorder=0))
     axes.plot(*lane.points.T, color=BLUE, lw=1.5, dashes=(5, 3), zorder=3)
     nearest = lane.pose_at(12.0)

@@ -9,11 +9,12 @@ for byte.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+from caldrive.provenance import file_digest
 
 DRIVE = [
     "--town", "town02", "--weather", "14", "--task", "navigation-dynamic", "--cap", "20", "--seconds", "60",
@@ -27,7 +28,7 @@ def drive(out: Path, arguments: list[str]) -> str:
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     if ended.returncode != 0:
         raise SystemExit(f"found that a drive ended with code {ended.returncode}: {ended.stderr.strip()}")
-    return hashlib.sha256((out / "episode-000.json").read_bytes()).hexdigest()[:16]
+    return file_digest(out / "episode-000.json")
 
 
 def main() -> int:

@@ -26,7 +26,6 @@ from caldrive.collection.recorder import record_episode
 from caldrive.control.controller import CALController
 from caldrive.control.presets import PAPER
 from caldrive.datatypes import CameraConfig, Control, Observation, Step
-from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.tasks import task_scenarios
 from caldrive.interfaces import Agent
@@ -77,7 +76,7 @@ def driven(world: EmbeddedWorld, agent: Agent, scenario: Scenario) -> list[float
             rows.append([astuple(step.truth.ego.pose), step.observation.speed, astuple(step.control), cars, people])
             rows.append([astuple(step.truth.affordances), step.truth.opposite_share, step.truth.speed_limit])
 
-    result = run_episode(world, agent, scenario, watch, Referee(scenario))
+    result = run_episode(world, agent, scenario, watch)
     return list(numbers([rows, result_values(result), metrics.compute(result.infractions)]))
 
 

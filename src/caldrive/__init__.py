@@ -1,6 +1,6 @@
 """caldrive: Conditional Affordance Learning for urban driving.
 
-One loop carries everything. A world shows an image, an agent turns it into six affordances and those into a control,
+One loop drives. A world shows an image, an agent turns it into six affordances and those into a control,
 the world moves on, and a referee who knows the truth writes down how it went:
 
     from caldrive import CALAgent, CALController, OraclePerception, make_world, run_episode, task_scenarios

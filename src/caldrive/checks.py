@@ -9,6 +9,7 @@ from pathlib import Path
 MOST_SEED = 2**31 - 1  # a million times as much is still a seed for torch
 MOST_WORKERS = 1024
 MOST_PIXELS = 4096  # a side of an image
+MOST_LOOKS = 100  # of a town on one sheet
 
 
 def require_within(option: str, value: float, low: float, high: float, usual: float) -> None:

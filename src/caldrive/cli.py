@@ -1,6 +1,8 @@
 """The command line: parses, runs one command, prints what it found or what went wrong.
 
-Exit codes: 0 for success, 1 where a check that was asked for says no, 2 for an error, 130 after Ctrl-C.
+Exit codes: 0 for success, 2 for an error, 130 after Ctrl-C; 1 where what was looked at is not as it should be (a
+damaged recording, a drive that goes otherwise than before, with --strict a goal that was not reached), or nobody reads
+the answer.
 """
 
 from __future__ import annotations
@@ -86,17 +88,17 @@ def _defaults(verb: str, arguments: Sequence[str]) -> Any:
     """The verb's options before the command line changes them: a preset's, and those in a TOML file."""
     kind = VERBS[verb].kind
     presets = getattr(kind, "PRESETS", {})
-    name, file = _value(arguments, "--preset"), _value(arguments, "--config")
-    if name is not None and presets and name not in presets:
+    name = _value(arguments, "--preset") if presets else None
+    file = _value(arguments, "--config") if hasattr(kind, "config") else None
+    if name is not None and name not in presets:
         raise ValueError(
             f"found preset {name!r}, wanted one of {', '.join(presets)}: type --preset {next(iter(presets))}"
         )
-    if not file and not (name and presets):
-        return None
-    if name and presets:
+    if name is not None:
         presets = dict.fromkeys(presets, presets[name])  # what the command line says goes before what a file says
-    options = presets[name] if name and presets else kind()
-    return from_toml(Path(file), presets, options) if file else options
+    if not file:
+        return presets.get(name)
+    return from_toml(Path(file), presets, presets.get(name, kind()))
 
 
 def _value(arguments: Sequence[str], option: str) -> str | None:

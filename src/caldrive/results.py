@@ -23,6 +23,9 @@ class Outcome(Enum):
     ABORTED = "was stopped before its end"
 
 
+WITHOUT_END = (Outcome.TIMEOUT, Outcome.ABORTED)  # neither the goal nor a broken rule ended the episode
+
+
 class InfractionKind(Enum):
     """The paper's six kinds of infraction (section 3)."""
 

@@ -27,6 +27,11 @@ def test_a_car_that_stands_for_nothing_says_what_it_saw() -> None:
     assert red.event == "stopped without a red light"
 
 
+def test_steps_in_which_the_truth_is_not_known_do_not_count() -> None:
+    assert failure_cause(trace(true_center_distance=after(200, 1.5, before=None))).x == 100.0
+    assert failure_cause(trace(true_center_distance=None)).event == "was too slow"
+
+
 def test_an_agent_without_affordances_left_its_lane_or_stood_all_the_same() -> None:
     unseen = dict.fromkeys(("predicted_center_distance", "predicted_relative_angle", "predicted_hazard_stop"))
     cause = failure_cause(trace(true_center_distance=after(200, 1.5), **unseen))

@@ -211,9 +211,9 @@ def test_a_reader_is_told_of_foreign_lines_and_edited_results(whole: BenchmarkSe
     rows[0]["result"]["distance"] += 100.0
     path.write_text("".join(json.dumps(row) + "\n" for row in [*rows, rows[1] | {"key": "of-another-suite"}]))
     foreign, edited = RunFolder(tmp_path / "run").problems()
-    assert "1 lines are of no trial" in foreign
+    assert "lines of no trial" in foreign
     assert "of-another-suite" in foreign
-    assert edited == f"1 lines say something else than their traces, such as {rows[0]['key']}"
+    assert edited == f"lines that say something else than their traces: 1, such as {rows[0]['key']}"
 
 
 @pytest.mark.parametrize(

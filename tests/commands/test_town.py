@@ -65,6 +65,10 @@ MISTAKES = {
     "a plan too small to read": (["--plan", "plan.png", "--width", "100"], "type --width 1600"),
     "one file for both": (["--plan", "a.png", "--sheet", "a.png"], "type another --plan"),
     "looks of a plan": (["--plan", "plan.png", "--randomised", "2"], "type --sheet FILE"),
+    "too many looks, beside a plan": (
+        ["--plan", "plan.png", "--sheet", "sheet.png", "--randomised", "101"],
+        "type --randomised 8",
+    ),
     "an unknown town": (["--plan", "plan.png", "--town", "mars"], "type --town town01"),
 }
 

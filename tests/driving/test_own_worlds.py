@@ -10,13 +10,22 @@ import numpy as np
 import pytest
 
 import tests.fakes
-from caldrive.driving.setup import make_world
+from caldrive.agents.settings import AgentSettings
+from caldrive.driving.setup import make_world, set_up
 from caldrive.interfaces import is_mapped
 from caldrive.visualization.hud import CAMERA, SIZE
 from tests.command_line import refusal, run_json, write_agent
 
 WORLD = f"{tests.fakes.__file__}:StraightRoad"
 DRIVE = ["drive", "--agent", "oracle", "--world", WORLD, "--from", "0,0", "--to", "60,0"]
+
+
+def test_a_world_is_closed_where_its_agent_cannot_be_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = []
+    monkeypatch.setattr(tests.fakes.StraightRoad, "close", lambda world: closed.append(world))
+    with pytest.raises(ValueError, match="found controller 'wild'"):
+        set_up(AgentSettings(agent="oracle", controller="wild"), "tests.fakes:StraightRoad")
+    assert len(closed) == 1
 
 
 def test_it_has_neither_map_nor_movable_cameras() -> None:

@@ -18,7 +18,7 @@ from caldrive.driving.referee import Referee
 from caldrive.driving.trace import COLUMNS, Trace, episode_json
 from caldrive.files import as_type, read_json
 from caldrive.interfaces import World, is_recordable
-from caldrive.results import EpisodeResult, Outcome
+from caldrive.results import WITHOUT_END, EpisodeResult
 
 STILL = replace(CameraConfig(), width=480, height=212)
 MAX_STILLS = 4  # of one episode; more would show the same again
@@ -55,7 +55,7 @@ class EpisodeArtifacts:
     def files(self, key: str, result: EpisodeResult) -> dict[str, bytes]:
         """Trace and stills by their names in a run's folder. key: the trial's."""
         stills = list(self.stills)
-        if result.outcome in (Outcome.TIMEOUT, Outcome.ABORTED) and len(stills) < MAX_STILLS:
+        if result.outcome in WITHOUT_END and len(stills) < MAX_STILLS:
             stills.append(self._still())
         pictures = [simplejpeg.encode_jpeg(still, **JPEG) for still in stills]
         return artifact_files(key, episode_json(result, self.trace), pictures)
@@ -80,7 +80,10 @@ def still_paths(folder: Path, key: str) -> list[Path]:
 def read_trace(folder: Path, key: str) -> dict[str, list[Any]] | None:
     """The columns of a trial's trace, None where it left none. Raises ValueError where it is damaged."""
     path = trace_path(folder, key)
-    return dict(read_trace_file(path)["trace"]) if path.is_file() else None
+    if not path.is_file():
+        return None
+    columns: dict[str, list[Any]] = read_trace_file(path)["trace"]
+    return columns
 
 
 def read_trace_file(path: Path) -> dict[str, Any]:

@@ -59,6 +59,13 @@ class EpisodeMetrics:
         return metrics
 
 
+def stretches(time: Column, true: NDArray[np.bool_], gap: float) -> list[NDArray[np.intp]]:
+    """The numbers of the steps in which something is true, split where it is not for more than gap s. time, true: (N,),
+    time in s."""
+    steps = np.flatnonzero(true)
+    return np.split(steps, np.flatnonzero(np.diff(time[steps]) > gap) + 1) if len(steps) else []
+
+
 def red_lights_obeyed(time: Column, red: Column, speed: Column, run_at: Sequence[float]) -> int:
     """Lights that the car stood before while they were red, and did not run.
 
@@ -66,10 +73,7 @@ def red_lights_obeyed(time: Column, red: Column, speed: Column, run_at: Sequence
     was run (s), which is the end of the last approach to one. What turned green before the car stood, or was passed on
     yellow, does not count.
     """
-    steps = np.flatnonzero(red > 0.5)
-    if not len(steps):
-        return 0
-    approaches = np.split(steps, np.flatnonzero(np.diff(time[steps]) > SAME_LIGHT_GAP) + 1)
+    approaches = stretches(time, red > 0.5, SAME_LIGHT_GAP)
     starts = time[[approach[0] for approach in approaches]]
     run = {int(np.searchsorted(starts, seconds, side="right")) - 1 for seconds in run_at}
     return sum(k not in run and bool(speed[approach].min() < STANDING_SPEED) for k, approach in enumerate(approaches))

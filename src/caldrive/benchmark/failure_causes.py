@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.affordances import BY_NAME
-from caldrive.benchmark.episode_metrics import STANDING_SPEED
+from caldrive.benchmark.episode_metrics import STANDING_SPEED, stretches
 
 Columns = Mapping[str, list[Any]]
 OFF_CENTER = 1.3  # m from the centre line, where a wheel is over the marking of a lane of 4 m
@@ -52,9 +52,9 @@ class FailureCause:
 
 def failure_cause(trace: Columns) -> FailureCause:
     """How a missed goal began. trace: one value a step, by name (`Trace`)."""
-    time = np.array(trace["time"])
+    time, off_center = np.array(trace["time"]), np.array(trace["true_center_distance"], dtype=float)  # null is NaN
     first_steps = {
-        LEFT_LANE: _first_lasting(time, np.abs(trace["true_center_distance"]) > OFF_CENTER, OFF_CENTER_SECONDS),
+        LEFT_LANE: _first_lasting(time, np.abs(off_center) > OFF_CENTER, OFF_CENTER_SECONDS),
         NO_HAZARD: _first_lasting(time, _needless_stop(trace, "hazard_stop"), NEEDLESS_SECONDS),
         NO_RED_LIGHT: _first_lasting(time, _needless_stop(trace, "red_light"), NEEDLESS_SECONDS),
     }
@@ -73,11 +73,8 @@ def common_places(causes: Iterable[FailureCause]) -> list[tuple[Place, int]]:
 
 def _first_lasting(time: NDArray[np.float64], true: NDArray[np.bool_], seconds: float) -> int | None:
     """The step in which something begins that is true for so long; short gaps do not end it. time, true: (N,)."""
-    steps = np.flatnonzero(true)
-    for run in np.split(steps, np.flatnonzero(np.diff(time[steps]) > MAX_GAP) + 1):
-        if len(run) and time[run[-1]] - time[run[0]] >= seconds:
-            return int(run[0])
-    return None
+    lasting = (run for run in stretches(time, true, MAX_GAP) if time[run[-1]] - time[run[0]] >= seconds)
+    return next((int(run[0]) for run in lasting), None)
 
 
 def _needless_stop(trace: Columns, name: str) -> NDArray[np.bool_]:

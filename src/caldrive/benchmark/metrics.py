@@ -58,6 +58,14 @@ def wilson(successes: int, n: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
+def by_condition(results: Iterable[TrialResult]) -> dict[str, list[TrialResult]]:
+    """The results of each condition, in the order of their first episodes."""
+    groups: dict[str, list[TrialResult]] = {}
+    for result in results:
+        groups.setdefault(result.trial.condition, []).append(result)
+    return groups
+
+
 def cells(results: Iterable[TrialResult]) -> list[Cell]:
     """One for each condition and task, in the order of their first episodes."""
     groups: dict[tuple[str, str], list[TrialResult]] = {}

@@ -16,7 +16,7 @@ from caldrive.driving.rollout import run_episode
 from caldrive.driving.setup import set_up
 from caldrive.progress import Progress, silent
 from caldrive.results import EpisodeResult, result_values
-from caldrive.visualization.episode_video import EpisodeFilm, Shown, VideoWriter, caption
+from caldrive.visualization.episode_video import EpisodeFilm, VideoWriter, caption
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,11 @@ def _film(folder: RunFolder, trial: Trial, out: Path, progress: Progress) -> Epi
     with closing(world), VideoWriter(out, rate=1 / world.dt) as video:
         referee = Referee(trial.scenario, trial.fatal)
         text = f"{caption(trial.scenario, 1, 1)}   {trial.key}"
-        film = EpisodeFilm(video, world, Shown(text, trial.scenario, referee.infractions, truth=True))
+        film = EpisodeFilm(video, world, trial.scenario, caption=text, infractions=referee.infractions, truth=True)
 
-        def watch(step: Step) -> None:
-            film.add(step)
+        def report(step: Step) -> None:
             progress(trial.key, min(1.0, step.truth.route_done / step.truth.route_length))
 
-        result = run_episode(world, agent, trial.scenario, on_step=watch, referee=referee)
+        result = run_episode(world, agent, trial.scenario, film.add, report, referee=referee)
         film.end(result)
     return result

@@ -142,12 +142,10 @@ class RunFolder:
             f"{sentence}: type caldrive benchmark as before, and it is driven again" for sentence in lines.damaged
         ]
         if foreign := sorted(lines.by_trial.keys() - set(keys)):
-            problems.append(
-                f"{len(foreign)} lines are of no trial of {self.description['suite']}, such as {foreign[0]}"
-            )
+            problems.append(f"lines of no trial of {self.description['suite']}: {len(foreign)}, such as {foreign[0]}")
         changed = [key for key, line in lines.by_trial.items() if _changed(self.path, key, line)]
         if changed:
-            problems.append(f"{len(changed)} lines say something else than their traces, such as {changed[0]}")
+            problems.append(f"lines that say something else than their traces: {len(changed)}, such as {changed[0]}")
         done = sum(key in lines.by_trial for key in keys)
         if done < len(keys):
             problems.append(f"unfinished: {done} of {len(keys)} episodes are driven")

@@ -19,7 +19,6 @@ from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, driver_prove
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import SUITES, Trial, suite
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_writable_folder
-from caldrive.datatypes import Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import AgentError, run_episode
 from caldrive.driving.setup import set_up
@@ -54,13 +53,8 @@ def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
     world, agent, provenance = _worker(driver)
     referee = Referee(trial.scenario, trial.fatal)
     metrics, artifacts = EpisodeMetrics(), EpisodeArtifacts(world, referee)
-
-    def watch(step: Step) -> None:
-        metrics.add(step)
-        artifacts.add(step)
-
     try:
-        result = run_episode(world, agent, trial.scenario, on_step=watch, referee=referee)
+        result = run_episode(world, agent, trial.scenario, metrics.add, artifacts.add, referee=referee)
     except AgentError as error:
         raise AgentError(f"{error} (in episode {trial.key})") from error
     figures = {name: plain(value) for name, value in metrics.compute(result.infractions).items()}

@@ -25,14 +25,10 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.recordings.check import RecordingSummary
 
 
-def infraction_counts(result: EpisodeResult) -> dict[str, int]:
-    """How many of each kind, in the order in which they first happened."""
-    return dict(Counter(infraction.kind.value for infraction in result.infractions))
-
-
 def _row(k: int, result: EpisodeResult) -> list[str | Text]:
     """An episode's row of `drive_table`."""
-    infractions = ", ".join(f"{n} × {kind}" for kind, n in infraction_counts(result).items())
+    counts = Counter(infraction.kind.value for infraction in result.infractions)
+    infractions = ", ".join(f"{n} × {kind}" for kind, n in counts.items())
     reached = result.outcome is Outcome.SUCCESS
     return [
         str(k),
@@ -122,14 +118,11 @@ def success_table(results: Sequence[TrialResult]) -> Table:
 
 def infraction_table(results: Sequence[TrialResult]) -> Table:
     """Kilometres between infractions of each kind, by condition."""
-    from caldrive.benchmark.metrics import infraction_rates
+    from caldrive.benchmark.metrics import by_condition, infraction_rates
 
-    conditions = list(dict.fromkeys(result.trial.condition for result in results))
-    table = Table("km between", *map(escape, conditions), box=SIMPLE_HEAD)
-    columns = [
-        infraction_rates([result for result in results if result.trial.condition == name]) for name in conditions
-    ]
-    for row in zip(*columns, strict=True):
+    columns = {condition: infraction_rates(members) for condition, members in by_condition(results).items()}
+    table = Table("km between", *map(escape, columns), box=SIMPLE_HEAD)
+    for row in zip(*columns.values(), strict=True):
         table.add_row(row[0].kind.value, *(f"{rate.km_between} ({rate.count})" for rate in row))
     return table
 

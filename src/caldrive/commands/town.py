@@ -52,13 +52,14 @@ class Town(Output):
 
     def _check(self, sheet: Path | None) -> None:
         """Raises ValueError or OSError where a file cannot be, before the other one is written."""
-        from caldrive.checks import require_writable_file
+        from caldrive.checks import MOST_LOOKS, require_within, require_writable_file
 
         for option, path in (("--sheet", sheet), ("--plan", self.plan)):
             if path is not None:
                 require_writable_file(path, option, ".png")
         if self.plan is not None and sheet is not None and self.plan.resolve() == sheet.resolve():
             raise ValueError(f"found {sheet} for the sheet and for the plan, wanted two files: type another --plan")
+        require_within("--randomised", self.randomised, 0, MOST_LOOKS, 8)
         if self.randomised and sheet is None:
             raise ValueError(
                 "found --randomised without --sheet, wanted both, as a plan has no looks: type --sheet FILE"

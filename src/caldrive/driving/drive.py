@@ -21,7 +21,7 @@ from caldrive.files import write_whole
 from caldrive.progress import Progress, silent
 from caldrive.results import EpisodeResult, Outcome, result_values
 from caldrive.scenarios import Scenario
-from caldrive.visualization.episode_video import EpisodeFilm, Shown, VideoWriter, caption
+from caldrive.visualization.episode_video import EpisodeFilm, VideoWriter, caption
 from caldrive.visualization.plots import draw_speed
 
 
@@ -64,10 +64,10 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
         for k, scenario in enumerate(scenarios):
             trace, referee = Trace(), Referee(scenario)
             text = caption(scenario, k + 1, len(scenarios))
-            film = EpisodeFilm(video, world, Shown(text, scenario, referee.infractions, show_truth))
+            film = EpisodeFilm(video, world, scenario, caption=text, infractions=referee.infractions, truth=show_truth)
             watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]
             watchers += [film.add] if settings.video else []
-            result = run_episode(world, agent, scenario, on_step=_each(watchers), referee=referee)
+            result = run_episode(world, agent, scenario, *watchers, referee=referee)
             film.end(result)
             results.append(result)
             files.append(settings.out / f"episode-{k:03d}.json")
@@ -75,16 +75,6 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
             if settings.video:
                 draw_speed(trace.columns(), text, files[-1].with_suffix(".png"))
     return DriveReport(results=tuple(results), files=tuple(files), video=video.path if video.frames else None)
-
-
-def _each(watchers: list[Callable[[Step], None]]) -> Callable[[Step], None]:
-    """One watcher that shows a step to all of them."""
-
-    def watch(step: Step) -> None:
-        for watcher in watchers:
-            watcher(step)
-
-    return watch
 
 
 def _reporter(progress: Progress, scenario: Scenario, k: int, of: int) -> Callable[[Step], None]:

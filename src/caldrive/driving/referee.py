@@ -12,7 +12,7 @@ from collections.abc import Collection
 
 from caldrive.datatypes import ContactKind, LightState, TrafficLight, Truth, VehicleState
 from caldrive.driving.comfort import comfort
-from caldrive.geometry import wrap_angle
+from caldrive.geometry import moved, wrap_angle
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 
@@ -38,8 +38,8 @@ MAX_LIGHT_ANGLE = math.radians(60)  # a light further off the ego's heading is f
 
 def front(ego: VehicleState) -> tuple[float, float]:
     """The middle of the front bumper (x, y), m."""
-    reach = ego.length / 2
-    return ego.pose.x + reach * math.cos(ego.pose.heading), ego.pose.y + reach * math.sin(ego.pose.heading)
+    bumper = moved(ego.pose, forward=ego.length / 2)
+    return bumper.x, bumper.y
 
 
 def crosses(light: TrafficLight, before: tuple[float, float], after: tuple[float, float]) -> bool:
@@ -75,7 +75,6 @@ class Referee:
         self.scenario, self.fatal = scenario, fatal
         self.infractions: list[Infraction] = []
         self.outcome: Outcome | None = None
-        self._frame = 0
         self._last_counted: dict[tuple[InfractionKind, bool], int] = {}  # frame of the last one of its kind and fault
         self._shares = {kind: deque[float](maxlen=RISE_FRAMES + 1) for kind in SHARE_RISE}
         self._last: Truth | None = None
@@ -138,9 +137,10 @@ class Referee:
 
     def _count(self, kind: InfractionKind, truth: Truth, at_fault: bool = True) -> None:
         """One more infraction, unless one of its kind and fault was counted shortly before."""
-        if self._frame - self._last_counted.get((kind, at_fault), NEVER) <= REST_FRAMES[kind]:
+        frame = len(self._times)
+        if frame - self._last_counted.get((kind, at_fault), NEVER) <= REST_FRAMES[kind]:
             return
-        self._last_counted[kind, at_fault] = self._frame
+        self._last_counted[kind, at_fault] = frame
         place = truth.ego.pose
         self.infractions.append(Infraction(kind=kind, time=truth.time, x=place.x, y=place.y, at_fault=at_fault))
 
@@ -150,7 +150,6 @@ class Referee:
             before, now = self._last.ego.pose, truth.ego.pose
             self._distance += math.hypot(now.x - before.x, now.y - before.y)
         self._last = truth
-        self._frame += 1
         self._times.append(truth.time)
         self._speeds.append(truth.ego.speed)
         self._headings.append(truth.ego.pose.heading)

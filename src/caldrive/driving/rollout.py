@@ -1,4 +1,4 @@
-"""The one loop: see, act, move. Driving, recording, the benchmark and videos all consume it.
+"""The loop: see, act, move. Driving, the benchmark and videos consume it; the recorder has one of its own.
 
 An agent may be anybody's code, so what it returns is checked here. An error is one sentence with step and value.
 """
@@ -109,19 +109,15 @@ def rollout(world: World, agent: Agent, scenario: Scenario) -> Iterator[Step]:
 
 
 def run_episode(
-    world: World,
-    agent: Agent,
-    scenario: Scenario,
-    on_step: Callable[[Step], None] | None = None,
-    referee: Referee | None = None,
+    world: World, agent: Agent, scenario: Scenario, *watchers: Callable[[Step], None], referee: Referee | None = None
 ) -> EpisodeResult:
-    """Drive until the referee ends the episode. on_step sees every step, the last included, after the referee; give the
+    """Drive until the referee ends the episode. watchers see every step, the last included, after the referee; give the
     referee to know what it has counted by then, or to have infractions that are fatal."""
     referee = referee or Referee(scenario)
     for step in rollout(world, agent, scenario):
         outcome = referee.watch(step.truth)
-        if on_step is not None:
-            on_step(step)
+        for watch in watchers:
+            watch(step)
         if outcome is not None:
             break
     return referee.result()

@@ -45,4 +45,8 @@ def set_up(settings: AgentSettings, world_name: str = "embedded", images: bool =
     entry = agent_entry(settings.agent)
     camera = entry.camera(settings) or (CameraConfig() if images else None)
     world = make_world(world_name, camera)
-    return world, entry.make(settings, world.dt, world.truth if entry.privileged else None)
+    try:
+        return world, entry.make(settings, world.dt, world.truth if entry.privileged else None)
+    except BaseException:
+        world.close()
+        raise

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image as Picture
 from PIL import ImageDraw, ImageFont
 
-from caldrive.checks import MOST_PIXELS, require_within, require_writable_file
+from caldrive.checks import MOST_LOOKS, MOST_PIXELS, require_within, require_writable_file
 from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.files import write_whole
 from caldrive.geometry import moved
@@ -112,7 +112,7 @@ def write_sheet(town: str, path: Path, width: int | None = None, randomised: int
     require_writable_file(path, "--sheet", ".png")
     if width is not None:
         require_within("--width", width, 16, 4 * MOST_PIXELS, 1920)
-    require_within("--randomised", randomised, 0, 100, 8)
+    require_within("--randomised", randomised, 0, MOST_LOOKS, 8)
     picture = Picture.fromarray(contact_sheet(town, randomised=randomised))
     if width is not None:
         picture = picture.resize((width, round(picture.height * width / picture.width)), Picture.Resampling.LANCZOS)

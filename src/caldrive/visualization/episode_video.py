@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -86,40 +85,34 @@ def caption(scenario: Scenario, number: int, of: int) -> str:
     return f"{town}   {scenario.task}   weather {conditions.id} {conditions.name}{count}"
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What a film shows beside the camera's picture.
-
-    infractions: those that the referee has counted so far, a list that grows. truth: whether the true affordances stand
-    beside those that the agent goes by.
-    """
-
-    caption: str
-    scenario: Scenario
-    infractions: Sequence[Infraction]
-    truth: bool
-
-
 class EpisodeFilm:
     """Films one episode in a world. Where the world has no map, there is no minimap; where its cameras cannot be moved,
-    the agent's own image is shown."""
+    the agent's own image is shown.
 
-    def __init__(self, video: VideoWriter, world: World, shown: Shown) -> None:
-        self.video, self.world, self.shown = video, world, shown
+    caption: the line above the picture. infractions: those that the referee has counted so far, a list that grows.
+    truth: whether the true affordances stand beside those that the agent goes by.
+    """
+
+    def __init__(
+        self, video: VideoWriter, world: World, scenario: Scenario, *, caption: str, infractions: Sequence[Infraction],
+        truth: bool,
+    ) -> None:  # fmt: skip
+        self.video, self.world, self.scenario = video, world, scenario
+        self.caption, self.infractions, self.truth = caption, infractions, truth
         self._hud: Hud | None = None  # drawn for a route, which is known after the world's reset
         self._last: Image | None = None
 
     def add(self, step: Step) -> None:
         """Film the world as it stands at a step."""
         if self._hud is None:
-            self._hud = Hud(self.shown.caption, self.shown.scenario.time_limit, self._minimap(), self.shown.truth)
-        self._last = self._hud.draw(self._view(step), step, self.shown.infractions)
+            self._hud = Hud(self.caption, self.scenario.time_limit, self._minimap(), self.truth)
+        self._last = self._hud.draw(self._view(step), step, self.infractions)
         self.video.add(self._last)
 
     def _minimap(self) -> MiniMap | None:
         if not is_mapped(self.world):
             return None
-        return MiniMap(self.world.roads, self.world.route, self.shown.scenario.goal, PANEL)
+        return MiniMap(self.world.roads, self.world.route, self.scenario.goal, PANEL)
 
     def _view(self, step: Step) -> Image:
         """The picture (432, 960, 3)."""

@@ -140,30 +140,27 @@ def draw_gauges(draw: Draw, seen: Affordances | None, true: Affordances | None) 
         write(draw, (VALUE, _middle(row)), _text(spec, value), 16, MUTED if value is None else TEXT, "rm")
         if real is not None:
             write(draw, (TRUE, _middle(row)), _text(spec, real), 13, MUTED, "rm")
-        if _has_bar(spec):
-            _fill_bar(draw, row, value, real)
-        else:
-            _draw_classes(draw, row, value, real)
+        draw_value = _fill_bar if _has_bar(spec) else _draw_classes
+        draw_value(draw, _bar(row), spec, value, real)
 
 
-def _fill_bar(draw: Draw, row: int, value: float | None, real: float | None) -> None:
+def _fill_bar(draw: Draw, bar: Box, spec: AffordanceSpec, value: float | None, real: float | None) -> None:
     """A bar from where the affordance says nothing (nobody ahead, no angle) to its value, and a mark at the truth."""
-    spec = SPECS[row]
     if value is not None and math.isfinite(value):
         rest = _value(spec, Affordances()) or 0.0
-        fill(draw, _bar(row), _share(spec, rest), _share(spec, value), _gauge(spec).color)
+        fill(draw, bar, _share(spec, rest), _share(spec, value), _gauge(spec).color)
     if real is not None:
-        tick(draw, _bar(row), _share(spec, real))
+        tick(draw, bar, _share(spec, real))
 
 
-def _draw_classes(draw: Draw, row: int, value: float | None, real: float | None) -> None:
+def _draw_classes(draw: Draw, bar: Box, spec: AffordanceSpec, value: float | None, real: float | None) -> None:
     """A box for each class but the first, which stands for none; the one that is seen is lit."""
-    left, top, right, bottom = _bar(row)
-    classes, gap = SPECS[row].classes[1:], 4
+    left, top, right, bottom = bar
+    classes, gap = spec.classes[1:], 4
     width = (right - left + gap) / len(classes)
     for k, number in enumerate(classes):
         box = (left + k * width, top - 4, left + (k + 1) * width - gap, bottom + 4)
         lit = value == number
         outline = RED if number in (value, real) else None
         draw.rounded_rectangle(box, 4, fill=TEXT if lit else TRACK, outline=outline, width=2)
-        write(draw, ((box[0] + box[2]) / 2, _middle(row)), str(number), 13, DARK_TEXT if lit else MUTED, "mm")
+        write(draw, ((box[0] + box[2]) / 2, (top + bottom) / 2), str(number), 13, DARK_TEXT if lit else MUTED, "mm")

@@ -75,6 +75,12 @@ def command_sign(command: Command) -> Picture.Image:
     return picture.reduce(scale)
 
 
+def draw_command(panel: Picture.Image, draw: Draw, command: Command) -> None:
+    """The sign of the command in the panel's corner, and its name below."""
+    panel.paste(command_sign(command), (TILE[0], TILE[1]))
+    write(draw, (64, 128), command.value, 16, TEXT, "mm")
+
+
 @lru_cache(maxsize=2)
 def _frame(truth: bool) -> Picture.Image:
     """What never changes of the panel."""
@@ -140,8 +146,7 @@ class Hud:
         panel = _frame(self.truth).copy()
         draw = ImageDraw.Draw(panel)
         decision = step.decision or Decision(step.control)
-        panel.paste(command_sign(step.observation.command), (TILE[0], TILE[1]))
-        write(draw, (64, 128), step.observation.command.value, 16, TEXT, "mm")
+        draw_command(panel, draw, step.observation.command)
         _draw_speed(panel, draw, step.observation.speed, decision)
         _draw_controls(draw, step.control)
         draw_gauges(draw, decision.affordances, step.truth.affordances if self.truth else None)

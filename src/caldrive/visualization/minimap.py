@@ -33,7 +33,7 @@ class MiniMap:
         x0, y0, x1, y1 = roads.bounds
         self._middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2))
         self._scale = (size - 2 * MARGIN) * OVERSAMPLED / max(x1 - x0, y1 - y0)
-        self._base = _town(self, roads).copy()
+        self._base = _town(self, roads)
         driven = route.line.points[route.line.s < route.length]
         end = route.line.pose_at(route.length)
         draw = ImageDraw.Draw(self._base)

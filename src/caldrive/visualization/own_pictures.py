@@ -9,8 +9,8 @@ from PIL import Image as Picture
 from PIL import ImageDraw
 
 from caldrive.datatypes import Affordances, Command, Image
-from caldrive.visualization.gauges import BACKGROUND, MUTED, RED, TEXT, TOP, Draw, draw_frame, draw_gauges, write
-from caldrive.visualization.hud import CAMERA, HEADER, PANEL, TILE, command_sign, draw_badge
+from caldrive.visualization.gauges import BACKGROUND, MUTED, RED, TOP, Draw, draw_frame, draw_gauges, write
+from caldrive.visualization.hud import CAMERA, HEADER, PANEL, draw_badge, draw_command
 
 WIDTH = CAMERA.width
 LOWEST, HIGHEST = 216, 720  # pixels: the height that a picture is given, whatever its shape
@@ -66,8 +66,7 @@ class SeenFrames:
     def _panel(self, seen: SeenPicture) -> Image:
         panel = Picture.new("RGB", (WIDTH, PANEL), BACKGROUND)
         draw = ImageDraw.Draw(panel)
-        panel.paste(command_sign(self.command), (TILE[0], TILE[1]))
-        write(draw, (64, 128), self.command.value, 16, TEXT, "mm")
+        draw_command(panel, draw, self.command)
         self._write_numbers(draw, seen)
         draw_frame(draw, truth=False)
         draw_gauges(draw, seen.affordances, None)

@@ -5,7 +5,6 @@ From it a person reads off the places for `caldrive drive --from X,Y --to X,Y`.
 
 from __future__ import annotations
 
-import io
 import math
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from PIL import Image as Picture
 
 from caldrive.checks import MOST_PIXELS, require_within, require_writable_file
 from caldrive.datatypes import Points, Pose
-from caldrive.files import write_whole
+from caldrive.files import write_figure
 from caldrive.geometry import box_corners, moved, to_world
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.roads.towns import load_roads
@@ -207,7 +206,6 @@ def write_plan(town: str, path: Path, width: int | None = None) -> tuple[int, in
         f"Drive between two places, for example: caldrive drive --town {town} {places}\n"
         "A place takes the nearest lane; X,Y,HEADING asks for another one (degrees from the east, counter-clockwise)."
     )
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=DPI)
-    write_whole(path, content.getvalue())
-    return Picture.open(content).size
+    write_figure(path, figure, DPI)
+    with Picture.open(path) as picture:
+        return picture.size

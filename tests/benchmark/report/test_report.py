@@ -127,6 +127,12 @@ def test_failures_say_what_was_wrong_before(runs: list[BenchmarkRun]) -> None:
     assert failed[0].errors_before == ("relative angle 0.30 rad, hazard stop 50 %",)
 
 
+def test_one_of_a_kind_stands_in_the_singular(runs: list[BenchmarkRun]) -> None:
+    text = report_text([replace(runs[0], results=runs[0].results[:5])])
+    assert "1 infraction in 1 km" in text
+    assert "1 episode missed its goal" in text
+
+
 def test_every_affordance_has_an_error_from_which_it_is_named() -> None:
     assert set(LARGE_ERRORS) == set(BY_NAME)
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from caldrive.affordances import CONTINUOUS
 from caldrive.benchmark.artifacts import read_trace
-from caldrive.benchmark.metrics import cells
 from caldrive.benchmark.published import SYSTEMS, success
-from caldrive.benchmark.report.runs import BenchmarkRun
+from caldrive.benchmark.report.runs import BenchmarkRun, cells_by_place
 from caldrive.datatypes import KMH
 from caldrive.results import Infraction, InfractionKind
 from caldrive.world.roads.towns import load_roads
@@ -43,7 +42,7 @@ def success_figure(runs: Sequence[BenchmarkRun]) -> str:
     """Success in each cell with its interval, and the paper's systems as markers."""
     figure = Figure(figsize=(12, 4.2), layout="constrained")
     ax = figure.subplots()
-    by_place = {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.results)}
+    by_place = cells_by_place(runs)
     places = list(dict.fromkeys(key[1:] for key in by_place))
     width = 0.8 / len(runs)
     for k, run in enumerate(runs):

@@ -12,7 +12,7 @@ from caldrive.benchmark.artifacts import still_paths
 from caldrive.benchmark.metrics import succeeded
 from caldrive.benchmark.report.figures import errors_figure, map_figure, speed_figure, success_figure
 from caldrive.benchmark.report.runs import BenchmarkRun, Failure, failures
-from caldrive.benchmark.report.tables import Table, headline, tables
+from caldrive.benchmark.report.tables import Table, counted, headline, tables
 
 _DATA = Path(__file__).parent
 MAX_STILLS = 120  # on one page; beyond that it would be long to open and large to keep
@@ -133,7 +133,8 @@ def report_text(runs: Sequence[BenchmarkRun]) -> str:
     parts, failed = ["# Benchmark", "", headline(runs), ""], failures(runs)
     for table in tables(runs):
         parts += [f"## {table.title}", "", table.text, "", *_markdown_table(table.head, table.rows), ""]
-    parts += ["## Failures", "", f"{len(failed)} episodes missed their goal or broke a rule.", ""]
+    whose = "its" if len(failed) == 1 else "their"
+    parts += ["## Failures", "", f"{counted(len(failed), 'episode')} missed {whose} goal or broke a rule.", ""]
     parts += _markdown_table(FAILURE_HEAD, [_failure_row(failure) for failure in failed])
     return "\n".join(parts) + "\n"
 

@@ -12,12 +12,12 @@ from typing import Any
 from caldrive.affordances import CONTINUOUS, DISCRETE
 from caldrive.benchmark.artifacts import read_trace
 from caldrive.benchmark.failure_causes import FailureCause, failure_cause
-from caldrive.benchmark.metrics import succeeded
+from caldrive.benchmark.metrics import Cell, cells, is_clean
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import TrialResult
 from caldrive.plugins import short_name
-from caldrive.results import Outcome
+from caldrive.results import WITHOUT_END
 
 LARGE_ERRORS = {  # before an infraction, from which an affordance is named: share of steps, or SI units
     "hazard_stop": 0.2, "red_light": 0.2, "speed_sign": 0.2, "vehicle_distance": 3.0, "relative_angle": 0.1,
@@ -48,16 +48,12 @@ class BenchmarkRun:
     @cached_property
     def failures(self) -> tuple[Failure, ...]:
         """The episodes that missed their goal or broke a rule, in the suite's order."""
-        return tuple(
-            self._failure(result)
-            for result in self.results
-            if not succeeded(result) or any(infraction.at_fault for infraction in result.episode.infractions)
-        )
+        return tuple(self._failure(result) for result in self.results if not is_clean(result))
 
     def _failure(self, result: TrialResult) -> Failure:
         errors = tuple(_errors_before(result, k) for k in range(len(result.episode.infractions)))
         # Where an infraction ended the episode, it is the cause.
-        missed = result.episode.outcome in (Outcome.TIMEOUT, Outcome.ABORTED)
+        missed = result.episode.outcome in WITHOUT_END
         trace = read_trace(self.folder, result.trial.key) if missed else None
         cause = failure_cause(trace) if trace else None
         return Failure(run=self.name, result=result, errors_before=errors, cause=cause)
@@ -126,6 +122,11 @@ def _unique_end(folder: Path, folders: Sequence[Path]) -> str:
 def conditions(runs: Sequence[BenchmarkRun]) -> list[str]:
     """All conditions in the order in which they first appear."""
     return list(dict.fromkeys(result.trial.condition for run in runs for result in run.results))
+
+
+def cells_by_place(runs: Sequence[BenchmarkRun]) -> dict[tuple[str, str, str], Cell]:
+    """The cells of all runs, by the run's name, condition and task."""
+    return {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.results)}
 
 
 def failures(runs: Sequence[BenchmarkRun]) -> list[Failure]:

@@ -10,7 +10,6 @@ from caldrive.affordances import BY_NAME, AffordanceSpec
 from caldrive.benchmark.failure_causes import common_places
 from caldrive.benchmark.metrics import (
     Cell,
-    cells,
     infraction_rates,
     mean_comfort,
     mean_errors,
@@ -18,7 +17,7 @@ from caldrive.benchmark.metrics import (
     succeeded,
 )
 from caldrive.benchmark.published import COMFORT, SYSTEMS, km_between, success
-from caldrive.benchmark.report.runs import BenchmarkRun, conditions
+from caldrive.benchmark.report.runs import BenchmarkRun, cells_by_place, conditions
 from caldrive.benchmark.suites import TrialResult
 
 DYNAMIC, ALL = "navigation-dynamic", "all"  # tasks whose infractions are counted together
@@ -63,9 +62,15 @@ def headline(runs: Sequence[BenchmarkRun]) -> str:
         reached = sum(succeeded(result) for result in run.results)
         km = sum(result.episode.distance for result in run.results) / 1000
         faults = sum(infraction.at_fault for result in run.results for infraction in result.episode.infractions)
-        said = f"{run.name}: {reached} of {len(run.results)} goals reached in time, {faults} infractions in {km:.0f} km"
+        said = f"{run.name}: {reached} of {len(run.results)} goals reached in time, "
+        said += f"{counted(faults, 'infraction')} in {km:.0f} km"
         sentences.append(f"{said} (see Problems)" if run.problems else said)
     return "; ".join(sentences) + "."
+
+
+def counted(n: int, noun: str) -> str:
+    """A number of things in words: 1 episode, 2 episodes."""
+    return f"{n} {noun}{'' if n == 1 else 's'}"
 
 
 def _runs(runs: Sequence[BenchmarkRun]) -> Table:
@@ -82,7 +87,7 @@ def _runs(runs: Sequence[BenchmarkRun]) -> Table:
 
 
 def _success(runs: Sequence[BenchmarkRun]) -> Table:
-    by_place = {(run.name, cell.condition, cell.task): cell for run in runs for cell in cells(run.results)}
+    by_place = cells_by_place(runs)
     rows = []
     for condition, task in dict.fromkeys(key[1:] for key in by_place):
         ours = [value for run in runs for value in _cell_texts(by_place.get((run.name, condition, task)))]
