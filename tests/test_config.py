@@ -23,7 +23,7 @@ class Car:
     name: str = "car"
     file: Path | None = None
     gears: tuple[int, ...] = (1, 2)
-    json: bool = False
+    json: bool = field(default=False, metadata={"typed": True})
 
     def __post_init__(self) -> None:
         if self.wheel.radius <= 0:
@@ -63,6 +63,7 @@ def test_paths_and_lists_have_their_types(tmp_path: Path) -> None:
     [
         ("wings = 2", r"found wings in .*car\.toml, wanted one of wheel, radius, spokes, name, file, gears"),
         ("[wheel]\nwings = 2", r"found wings in .*car\.toml, wheel, wanted one of radius, spokes"),
+        ("json = true", r"found json in .*car\.toml, wanted one of wheel, radius, spokes, name, file, gears:"),
         ("name = 3", r"found 3 in .*car\.toml, name .*change it"),
         ("[wheel]\nspokes = 2.5", r"found 2\.5 in .*wheel, spokes"),
         ("wheel = 3", "found 3 in .*wheel"),

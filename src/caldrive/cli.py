@@ -21,9 +21,9 @@ import tyro
 from tyro import _errors  # its one way to hear of a mistake before it is printed in a box; pinned in pyproject.toml
 
 from caldrive import __version__
-from caldrive.commands import VERBS, Answer, command_type, verb_words
+from caldrive.commands import GROUPS, VERBS, Answer, command_type, verb_words
 from caldrive.config import from_toml
-from caldrive.progress import only_answers_on_stdout, progress_bar
+from caldrive.progress import only_answers_on_stdout, progress_bar, readable_width
 
 DESCRIPTION = (
     "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller. "
@@ -34,6 +34,7 @@ FAILED, STOPPED = 2, 130  # exit codes
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None
 
 
+@readable_width()
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
@@ -78,6 +79,8 @@ def _say(text: str) -> None:
 
 def parse(arguments: Sequence[str]) -> Any:
     """The command that the words stand for. Raises ValueError with one sentence where they stand for none."""
+    if unusable := [word for word in arguments if "\0" in word]:
+        raise ValueError(f"found {unusable[0]!r}, wanted words without a null byte: type another")
     verb = verb_words(arguments)
     defaults = {verb: _defaults(verb, arguments)} if verb in VERBS else {}
     with _errors.on_parse_error(lambda event: _refuse(event, verb)):
@@ -96,7 +99,7 @@ def _defaults(verb: str, arguments: Sequence[str]) -> Any:
         )
     if name is not None:
         presets = dict.fromkeys(presets, presets[name])  # what the command line says goes before what a file says
-    if not file:
+    if file is None:
         return presets.get(name)
     return from_toml(Path(file), presets, presets.get(name, kind()))
 
@@ -113,9 +116,12 @@ def _value(arguments: Sequence[str], option: str) -> str | None:
 
 def _refuse(event: Any, verb: str) -> None:
     """Raises ValueError with what the parser could not understand, in one sentence."""
-    here = f"caldrive {verb} --help" if verb in VERBS else "caldrive --help"
+    group = verb.partition(" ")[0]
+    place = verb if verb in VERBS else group if group in GROUPS else ""
     mistake = _mistake(event, verb)
-    raise ValueError(mistake if ": type " in mistake else f"{mistake}: type {here}")
+    raise ValueError(
+        mistake if ": type " in mistake else f"{mistake}: type {' '.join(['caldrive', *place.split(), '--help'])}"
+    )
 
 
 def _mistake(event: Any, verb: str) -> str:
@@ -148,11 +154,15 @@ def _sentence(error: Exception) -> str:
     text = " ".join(str(error).split())
     if isinstance(error, OSError) and error.errno in FULL:
         return f"found no room on the disk for {error.filename or 'a file'}, wanted some: make room, and type it again"
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"found that {error.filename} is no use ({error.strerror.lower()}), wanted one that is: give another"
+    if isinstance(error, OSError) and error.strerror:
+        name = error.filename or "a file or folder"
+        return f"found that {name} is no use ({error.strerror.lower()}), wanted one that is: give another"
     if isinstance(error, MemoryError):
         return "found too little memory for this, wanted more: ask for less, or close other programs"
-    if isinstance(error, ValueError | OSError | RuntimeError) and text:
+    if isinstance(error, RuntimeError) and text.startswith("Symlink loop"):  # before Python 3.13
+        return f"found a {text[0].lower()}{text[1:]}, wanted a path that leads somewhere: give another"
+    of_libraries = isinstance(error, UnicodeError | RecursionError)
+    if isinstance(error, ValueError | OSError | RuntimeError) and text and not of_libraries:
         return text
     kind = type(error).__name__
     return f"found a fault of the program ({kind}: {text}), wanted none: set CALDRIVE_TRACEBACK=1 to see where it is"

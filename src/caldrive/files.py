@@ -50,10 +50,14 @@ T = TypeVar("T")
 def read_json(text: bytes | str, kind: type[T]) -> T:
     """What a JSON text says, as a plain type, a TypedDict or a dataclass.
 
-    Raises ValueError with the place where it says something else. NaN and Infinity are no JSON.
+    Raises ValueError with the place where it says something else. NaN and Infinity are no JSON, and a null byte is part
+    of no name.
     """
+    content = text.encode() if isinstance(text, str) else text
+    if b"\\u0000" in content:
+        raise ValueError("it has a null byte")
     try:
-        return msgspec.json.decode(text, type=kind)
+        return msgspec.json.decode(content, type=kind)
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
 

@@ -3,11 +3,34 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
+
+NARROWEST, WIDEST = 40, 1000  # columns: in fewer, tyro's help never ends
+
+
+@contextmanager
+def readable_width() -> Iterator[None]:
+    """Lets everybody who asks how wide the terminal is hear a number that text can be set in, whatever the terminal or
+    COLUMNS say: 0, 1 or nonsense."""
+    before = {name: os.environ.get(name) for name in ("COLUMNS", "LINES")}
+    columns, lines = shutil.get_terminal_size()
+    within = min(max(columns, NARROWEST), WIDEST)
+    if before["COLUMNS"] is not None or within != columns:
+        os.environ["COLUMNS"] = str(within)
+    if before["LINES"] is not None:
+        os.environ["LINES"] = str(lines)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
 
 
 def silent(label: str, share: float) -> None:

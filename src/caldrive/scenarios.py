@@ -9,6 +9,8 @@ from typing import Any
 from caldrive.datatypes import Pose
 from caldrive.files import as_type
 
+MOST_SEED = 2**53  # that JSON keeps exactly, as a number in 64 bits
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -39,6 +41,8 @@ class Scenario:
         for name in ("n_vehicles", "n_pedestrians", "seed", "crossing"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} is {getattr(self, name)}, but must be 0 or more: give a scenario that can be")
+        if self.seed >= MOST_SEED:
+            raise ValueError(f"seed is {self.seed}, but must be less than 2**53: give a scenario that can be")
         if not self.time_limit > 0:
             raise ValueError(f"time_limit is {self.time_limit}, but must be more than 0 s: give it some time")
         if not all(math.isfinite(value) for pose in (self.start, self.goal) for value in astuple(pose)):

@@ -58,8 +58,8 @@ def known_folder(folder: Path, trial: Trial, outcome: Outcome, kinds: tuple[Infr
     """A folder in which an episode ended so."""
     infractions = tuple(Infraction(kind, time=1.0 + k, x=0.0, y=0.0) for k, kind in enumerate(kinds))
     episode = EpisodeResult(
-        scenario=replace(trial.scenario, task="x"), outcome=outcome, duration=3.0, distance=1.0, route_done=1.0,
-        route_length=9.0, infractions=infractions,
+        scenario=replace(trial.scenario, task="x"), outcome=outcome, duration=30.0, distance=900.0,
+        route_done=1.0, route_length=9.0, infractions=infractions,
     )  # fmt: skip
     result = result_values(episode)
     line: dict[str, Any] = {"key": "x-0", "result": result, "figures": {}}

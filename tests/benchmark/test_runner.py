@@ -220,7 +220,9 @@ def test_a_reader_is_told_of_foreign_lines_and_edited_results(whole: BenchmarkSe
     "change",
     [
         {"duration": "abc"}, {"route_length": 0.0}, {"distance": -1.0}, {"comfort": None}, {"outcome": "won"},
-        {"infractions": [{"kind": "flight"}]}, {"scenario": {}},
+        {"infractions": [{"kind": "flight"}]}, {"scenario": {}}, {"distance": 1e9}, {"duration": 999.0},
+        {"outcome": "success", "distance": 0.0}, {"comfort": {"jerk": None}},
+        {"infractions": [{"kind": "red light", "time": 99.0, "x": 0.0, "y": 0.0}]},
     ],
     ids=str,
 )  # fmt: skip
@@ -232,10 +234,22 @@ def test_results_that_cannot_be_are_named(change: dict[str, Any], whole: Benchma
     assert re.fullmatch(r"line 1 of .*results\.jsonl is damaged \(.+\)", found.damaged[0], re.DOTALL)
 
 
-def test_figures_that_are_no_numbers_are_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"figures": {"off_lane": None}}, "off_lane is no number"),
+        ({"figures": {"off_lane": 1.5}}, "off_lane is 1.5"),
+        ({"figures": {"reds_obeyed": -3}}, "reds_obeyed is -3"),
+        ({"key": "../elsewhere"}, "'../elsewhere' is no key"),
+        ({"key": "a\0"}, "it has a null byte"),
+    ],
+)
+def test_figures_and_keys_that_cannot_be_are_named(
+    change: dict[str, Any], message: str, whole: BenchmarkSettings, tmp_path: Path
+) -> None:
     line = json.loads((whole.out / "results.jsonl").read_bytes().splitlines()[0])
-    (tmp_path / "results.jsonl").write_text(json.dumps(line | {"figures": {"off_lane": None}}) + "\n")
-    assert "off_lane is no number" in read_lines(tmp_path).damaged[0]
+    (tmp_path / "results.jsonl").write_text(json.dumps(line | change) + "\n")
+    assert message in read_lines(tmp_path).damaged[0]
 
 
 def test_an_episode_that_is_there_twice_counts_once_and_is_named(whole: BenchmarkSettings, tmp_path: Path) -> None:
@@ -278,7 +292,8 @@ def packed(columns: dict[str, Any]) -> bytes:
 
 SPOILT = [
     b"garbage", gzip.compress(b"{"), gzip.compress(b'{"trace": 3}'), packed({}), packed(trace() | {"x": [1.0]}),
-    packed(trace(0)), packed(trace(time="noon")),
+    packed(trace(0)), packed(trace(time="noon")), packed(trace(time=-1.0)), packed(trace(predicted_red_light="much")),
+    packed(trace(command=3)),
 ]  # fmt: skip
 
 

@@ -97,7 +97,7 @@ def test_files_that_are_no_suites_are_named(tmp_path: Path) -> None:
         suite("corl")
 
 
-@pytest.mark.parametrize("key", ["../../precious", "/tmp/a", "", ".", "a/b", "a" * 101, "a\0"])
+@pytest.mark.parametrize("key", ["../../precious", "/tmp/a", "", ".", "a/b", "a" * 101])
 def test_a_key_that_could_not_name_a_file_is_refused(key: str, tmp_path: Path) -> None:
     rows = json.loads(to_json(suite("quick")[:1]))
     (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"key": key}]))
@@ -114,6 +114,8 @@ def test_a_key_that_could_not_name_a_file_is_refused(key: str, tmp_path: Path) -
         {"time_limit": 0},
         {"start": [1, 2, 3]},
         {"cars": 3},
+        {"seed": 2**70},
+        {"town": "a\0.xodr"},
     ],
     ids=str,
 )

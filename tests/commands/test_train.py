@@ -47,7 +47,7 @@ def test_without_options_the_small_network_is_trained() -> None:
 def test_every_setting_of_the_training_and_of_the_network_is_an_option() -> None:
     train = parsed(
         *("--batch", "32", "--rate", "1e-4", "--loss-weights.red-light", "2", "--recolour.shadows", "1"),
-        *("--augmentation.no-enabled", "--network.red-light.layer", "gru", "--network.red-light.nodes", "100"),
+        *("--augmentation.enabled", "False", "--network.red-light.layer", "gru", "--network.red-light.nodes", "100"),
     )
     small = TRAININGS["small"]
     assert train.training == replace(

@@ -23,7 +23,10 @@ from caldrive.results import WITHOUT_END, EpisodeResult
 STILL = replace(CameraConfig(), width=480, height=212)
 MAX_STILLS = 4  # of one episode; more would show the same again
 JPEG = {"quality": 75, "colorspace": "RGB", "colorsubsampling": "420"}  # to be looked at, not to train on
-REQUIRED = ("time", "x", "y", "speed", "route_done")  # columns of a trace that are always numbers
+KINDS: dict[str, Any] = {  # of the columns of a trace; the others hold numbers, or null where nothing is known
+    **dict.fromkeys(("time", "x", "y", "speed", "route_done"), list[float]), "command": list[str],
+    "state": list[str | None],
+}  # fmt: skip
 
 
 class EpisodeArtifacts:
@@ -98,10 +101,12 @@ def read_trace_file(path: Path) -> dict[str, Any]:
 
 
 def _check_columns(columns: dict[str, list[Any]]) -> None:
-    """Raises ValueError where a trace lacks a column or a row."""
+    """Raises ValueError where a trace lacks a column or a row, or holds something else."""
     if missing := [name for name in COLUMNS if name not in columns]:
         raise ValueError(f"it lacks {missing[0]}")
     if len(set(map(len, columns.values()))) != 1 or not columns["time"]:
         raise ValueError("its columns are empty or of different lengths")
-    for name in REQUIRED:
-        as_type(columns[name], list[float])
+    for name in COLUMNS:
+        as_type(columns[name], KINDS.get(name, list[float | bool | None]))
+    if min(columns["time"]) < 0:
+        raise ValueError("its time is negative")

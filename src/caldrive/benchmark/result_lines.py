@@ -7,17 +7,22 @@ later costs its own episode only: it is named, and the episode is driven again.
 from __future__ import annotations
 
 import gzip
+import math
 import os
 import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypedDict
 
+from caldrive.benchmark.suites import is_key
+from caldrive.driving.referee import GOAL_RADIUS
 from caldrive.files import json_line, read_json, write_whole
-from caldrive.results import result_from_values
+from caldrive.results import EpisodeResult, Outcome, result_from_values
 
 RESULTS = "results.jsonl"
 COMPRESSED = RESULTS + ".gz"
+FASTEST = 100.0  # m/s
+ONE_STEP = 1.0  # s, a generous one: the last step of an episode ends after its limit
 
 
 class ResultLine(TypedDict):
@@ -72,11 +77,30 @@ def _content(path: Path) -> bytes:
 def _read_line(text: bytes) -> dict[str, Any]:
     """One line, as a `ResultLine`. Raises ValueError for anything else."""
     line = read_json(text, ResultLine)
-    result_from_values(line["result"])
+    if not is_key(line["key"]):
+        raise ValueError(f"{line['key']!r} is no key")
+    _check_possible(result_from_values(line["result"]))
     for name, value in line["figures"].items():
         if value is None and "/" not in name:  # of affordances nothing is known where nothing was seen
             raise ValueError(f"{name} is no number")
+        if value is not None and not 0 <= value <= (1 if name == "off_lane" else math.inf):
+            raise ValueError(f"{name} is {value}")
     return dict(line)
+
+
+def _check_possible(result: EpisodeResult) -> None:
+    """Raises ValueError for what no drive gives, and so was written by hand."""
+    start, goal = result.scenario.start, result.scenario.goal
+    away = math.dist((start.x, start.y), (goal.x, goal.y))
+    if result.outcome is Outcome.SUCCESS and result.distance < (away - GOAL_RADIUS) / 2:  # half: starts are moved a bit
+        raise ValueError(f"it reached a goal {away:.0f} m away by driving {result.distance:.0f} m")
+    if result.duration > result.scenario.time_limit + ONE_STEP:
+        raise ValueError(f"it took {result.duration:g} s of {result.scenario.time_limit:g} s")
+    if result.distance > FASTEST * (result.duration + ONE_STEP):
+        raise ValueError(f"it drove {result.distance:g} m in {result.duration:g} s")
+    for infraction in result.infractions:
+        if not 0 <= infraction.time <= result.duration + ONE_STEP:
+            raise ValueError(f"a rule was broken at {infraction.time:g} s of {result.duration:g} s")
 
 
 def has_lines(folder: Path) -> bool:

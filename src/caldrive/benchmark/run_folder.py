@@ -143,7 +143,7 @@ class RunFolder:
         ]
         if foreign := sorted(lines.by_trial.keys() - set(keys)):
             problems.append(f"lines of no trial of {self.description['suite']}: {len(foreign)}, such as {foreign[0]}")
-        changed = [key for key, line in lines.by_trial.items() if _changed(self.path, key, line)]
+        changed = [key for key in keys if key in lines.by_trial and _changed(self.path, key, lines.by_trial[key])]
         if changed:
             problems.append(f"lines that say something else than their traces: {len(changed)}, such as {changed[0]}")
         done = sum(key in lines.by_trial for key in keys)

@@ -162,9 +162,14 @@ class _Row(TypedDict):
     fatal: NotRequired[tuple[InfractionKind, ...]]
 
 
+def is_key(text: str) -> bool:
+    """Whether a text can be a trial's key, which names files."""
+    return re.fullmatch(r"\w[\w.-]{0,99}", text, re.ASCII) is not None
+
+
 def _trial(row: _Row) -> Trial:
-    """Raises ValueError where the key, which names files, holds other signs, or the scenario cannot be."""
-    if not re.fullmatch(r"\w[\w.-]{0,99}", row["key"], re.ASCII):
+    """Raises ValueError where the key holds other signs, or the scenario cannot be."""
+    if not is_key(row["key"]):
         raise ValueError(f"found key {row['key']!r}, wanted letters, digits, -, _ and .")
     return Trial(
         key=row["key"], condition=row["condition"], scenario=scenario_from_values(row["scenario"]),

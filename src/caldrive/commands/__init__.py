@@ -22,7 +22,7 @@ from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
 from caldrive.commands.train import Evaluate, Train
 
-__all__ = ["VERBS", "Answer", "command_type", "verb_words"]
+__all__ = ["GROUPS", "VERBS", "Answer", "command_type", "verb_words"]
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+TYPED = {"typed": True}  # an option that no file can give
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Answer:
 class Output:
     """How a verb answers."""
 
-    json: bool = False
+    json: bool = field(default=False, metadata=TYPED)
     """Print the result as JSON, and nothing else."""
 
 
@@ -28,5 +30,5 @@ class Output:
 class Configurable(Output):
     """A verb whose options may come from a file."""
 
-    config: Path | None = None
+    config: Path | None = field(default=None, metadata=TYPED)
     """A TOML file with any of these options; what the command line says goes before it."""

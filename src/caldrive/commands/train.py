@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from tyro.conf import arg
+from tyro.conf import FlagConversionOff, arg
 
 from caldrive.commands.answer import Answer, Configurable, Output
 from caldrive.perception.network.config import NETWORKS, NetworkConfig
@@ -26,8 +26,10 @@ class Train(Configurable):
     """Folder for model.safetensors, the state of the run, its metrics and their curves."""
     preset: str = "small"
     """What all other options begin with: small, for two cores, or paper: full width, from VGG16's ImageNet weights."""
-    training: Annotated[TrainingConfig, arg(name="")] = field(default=TRAININGS["small"], metadata={"flat": True})
-    network: NetworkConfig = NETWORKS["small"]
+    training: Annotated[TrainingConfig, arg(name=""), FlagConversionOff] = field(
+        default=TRAININGS["small"], metadata={"flat": True}
+    )
+    network: Annotated[NetworkConfig, FlagConversionOff] = NETWORKS["small"]
     """The network that is trained."""
 
     def run(self, progress: Progress) -> Answer:

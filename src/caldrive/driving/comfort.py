@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import savgol_filter
 
 Column = NDArray[np.float64]  # (N,), a value for each step
+METRICS = ("center_distance", "jerk", "lateral_straight", "lateral_turn", "turning", "comfortable")
 WINDOW = 7  # steps
 TURNING_RATE = 0.05  # rad/s, the yaw rate from which a car turns
 # nuPlan's bounds in SI units.

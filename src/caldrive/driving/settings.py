@@ -46,7 +46,8 @@ class DriveSettings(EpisodeSettings):
     episodes: int = 1
     """How many episodes, one for each route from --route on."""
     video: bool = True
-    """Film the drive and draw its speeds; --no-video does neither (in a file: video = false)."""
+    """Film the drive. --no-video leaves out drive.mp4 and the plots of speed (PNG), and writes each episode's trace
+    (episode-000.json) alone."""
     out: Path = Path("out/drive")
     """Folder for drive.mp4, and for each episode its trace (JSON) and its speed over distance (PNG)."""
 

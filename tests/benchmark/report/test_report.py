@@ -27,6 +27,7 @@ from caldrive.benchmark.report.runs import LARGE_ERRORS, BenchmarkRun, failures,
 from caldrive.benchmark.report.tables import tables
 from caldrive.benchmark.suites import TrialResult, suite
 from caldrive.commands.tables import benchmark_table
+from caldrive.files import json_line
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome, result_values
 from caldrive.scenarios import Scenario
 from tests.benchmark.traces import after, trace
@@ -239,6 +240,35 @@ def column(page: Any, table: int, head: str) -> list[str]:
     heads = of_page.locator("th").all_inner_texts()
     at = next(i for i, text in enumerate(heads) if text.startswith(head))
     return [row.locator("td").nth(at).inner_text() for row in of_page.locator("tbody tr").all()]
+
+
+def test_a_folder_of_a_compressed_file_alone_is_reported_with_all_that_is_wrong_with_it(tmp_path: Path) -> None:
+    whole, short = run("cal", tmp_path).results, {"distance": 500.0, "duration": 20.0}
+    lines: list[dict[str, Any]] = [
+        {"key": one.trial.key, "result": result_values(one.episode) | short, "figures": METRICS} for one in whole
+    ]
+    lines[0]["result"] |= {"outcome": "success", "distance": 0.0}
+    lines[1]["result"] |= {"comfort": {"jerk": 0.4}}
+    lines[2]["key"] = "of-another-suite"
+    (tmp_path / "run.json").write_text(json.dumps(DESCRIPTION))
+    (tmp_path / "results.jsonl.gz").write_bytes(gzip.compress(b"".join(map(json_line, lines)) + b"{\n"))
+    loaded = load_run(tmp_path)
+    assert len(loaded.results) == len(whole) - 3
+    text = report_text([loaded])
+    for said in (
+        "line 1 of",
+        "line 33 of",
+        "lines of no trial of quick: 1",
+        "unfinished: 30 of 32",
+        "lack figures",
+        "see Problems",
+    ):
+        assert said in text
+
+
+def test_a_name_from_a_file_stays_in_its_cell_of_a_table(runs: list[BenchmarkRun]) -> None:
+    text = report_text([replace(runs[0], name="own | agent\nof mine")])
+    assert "| own \\| agent of mine |" in text
 
 
 def test_problems_of_a_run_stand_in_the_report_and_in_its_headline(tmp_path: Path) -> None:

@@ -140,7 +140,13 @@ def report_text(runs: Sequence[BenchmarkRun]) -> str:
 
 
 def _markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in rows)]
+    lines = ("| " + " | ".join(map(_markdown_cell, row)) + " |" for row in (head, *rows))
+    return [next(lines), "|" + "---|" * len(head), *lines]
+
+
+def _markdown_cell(text: str) -> str:
+    """A text from a file as one cell: no line may end in it, and no other cell begin."""
+    return " ".join(text.splitlines()).replace("|", "\\|")
 
 
 def _failure_row(failure: Failure) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from caldrive.benchmark.metrics import Cell, cells, is_clean
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import TrialResult
+from caldrive.driving.comfort import METRICS
 from caldrive.plugins import short_name
 from caldrive.results import WITHOUT_END
 
@@ -90,13 +91,22 @@ def load_run(path: Path) -> BenchmarkRun:
     results = folder.results()
     if not results:
         raise ValueError(f"found no episode in {path}, wanted some: type caldrive benchmark --out {path}")
-    if not all("turning" in result.episode.comfort and "reds_obeyed" in result.metrics for result in results):
+    whole = tuple(result for result in results if _is_whole(result))
+    if not whole:
         raise ValueError(f"found results of an older caldrive in {path}: type caldrive benchmark --out ANOTHER")
+    problems = folder.problems()
+    if len(whole) < len(results):
+        lacking = next(result.trial.key for result in results if not _is_whole(result))
+        problems.append(f"lines that lack figures and are left out: {len(results) - len(whole)}, such as {lacking}")
     name = short_name(folder.description["agent"])
     return BenchmarkRun(
-        name=name, folder=path, description=folder.description, results=tuple(results),
-        problems=tuple(folder.problems()),
+        name=name, folder=path, description=folder.description, results=whole, problems=tuple(problems)
     )  # fmt: skip
+
+
+def _is_whole(result: TrialResult) -> bool:
+    """Whether a result has all the figures that the report's tables are made of."""
+    return result.episode.comfort.keys() >= set(METRICS) and "reds_obeyed" in result.metrics
 
 
 def load_runs(folders: Sequence[Path]) -> list[BenchmarkRun]:

@@ -15,7 +15,7 @@ class AugmentationConfig:
     """Augmentation of whole images (section 3.1). The frames of one window change alike."""
 
     enabled: bool = True
-    """Augment images; --augmentation.no-enabled leaves them as they are (in a file: enabled = false)."""
+    """Augment images; False leaves them as they are."""
     share: float = 0.5
     """Share of the windows to which each change of colour and light is applied."""
     rare_share: float = 0.2
@@ -42,7 +42,7 @@ class RecolourConfig:
     """Other colours for each class of things, where the recording has semantic images (domain randomisation)."""
 
     enabled: bool = True
-    """Recolour images; --recolour.no-enabled leaves them as they are (in a file: enabled = false)."""
+    """Recolour images; False leaves them as they are."""
     share: float = 0.5
     """Share of the windows that are recoloured."""
     tint: float = 0.35
