@@ -1,20 +1,29 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import islice
+from typing import Any
 
 import pytest
 
 from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.control.controller import CALController
 from caldrive.control.presets import DEFAULT
-from caldrive.datatypes import Affordances, Pose, Step
+from caldrive.datatypes import Affordances, Control, Observation, Pose, Step, Truth
 from caldrive.driving.rollout import rollout, run_episode
 from caldrive.results import InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 from tests.fakes import StraightRoad
 
 SCENARIO = Scenario("straight", 1, Pose(0, 0, 0), Pose(100, 0, 0), time_limit=30)
+
+
+class Idle:
+    def reset(self) -> None: ...
+
+    def act(self, observation: Observation) -> Control:
+        return Control()
 
 
 def driver(world: StraightRoad) -> CALAgent:
@@ -55,6 +64,19 @@ def test_an_episode_ends_when_time_is_up() -> None:
     result = run_episode(world, driver(world), replace(SCENARIO, time_limit=5))
     assert result.outcome is Outcome.TIMEOUT
     assert result.duration == pytest.approx(5, abs=0.11)
+
+
+@pytest.mark.parametrize("spoilt", [{"time": 0.0}, {"time": math.nan}, {"time": math.inf}, {"ego": None}], ids=str)
+def test_a_world_whose_clock_stands_still_or_whose_ego_is_nowhere_is_named(spoilt: dict[str, Any]) -> None:
+    class Spoilt(StraightRoad):
+        def truth(self) -> Truth:
+            truth = super().truth()
+            nowhere = replace(truth.ego, pose=Pose(math.nan, 0, 0))
+            return replace(truth, **spoilt if "time" in spoilt else {"ego": nowhere})
+
+    world = Spoilt()
+    with pytest.raises(ValueError, match=r"found that Spoilt .*correct its (step and its )?truth"):
+        run_episode(world, Idle(), replace(SCENARIO, time_limit=5))
 
 
 def test_a_driver_that_sees_no_red_is_caught() -> None:

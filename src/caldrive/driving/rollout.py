@@ -5,6 +5,7 @@ An agent may be anybody's code, so what it returns is checked here. An error is 
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import astuple
@@ -12,7 +13,7 @@ from numbers import Real
 from typing import Any
 
 from caldrive.affordances import SPECS
-from caldrive.datatypes import Affordances, Control, Decision, Observation, Step
+from caldrive.datatypes import Affordances, Control, Decision, Observation, Step, Truth
 from caldrive.driving.referee import Referee
 from caldrive.interfaces import Agent, World
 from caldrive.plugins import described
@@ -98,14 +99,35 @@ def _check_decision(agent: Agent, decision: Any, at: str) -> None:
 def rollout(world: World, agent: Agent, scenario: Scenario) -> Iterator[Step]:
     """Steps without end, one each world.dt seconds, until the consumer stops; asking for the next moves the world.
 
-    Raises AgentError where the agent fails, and what the world's reset raises for a scenario that cannot be.
+    Raises AgentError where the agent fails, ValueError where the world's clock stands still or its ego is nowhere, and
+    what the world's reset raises for a scenario that cannot be.
     """
-    observation, number = world.reset(scenario), 0
+    observation, number, times = world.reset(scenario), 0, (-math.inf, -math.inf)
     reset_agent(agent)
     while True:
         control, decision = next_step(agent, observation, number)
-        yield Step(observation, world.truth(), control, decision)
+        truth = world.truth()
+        times = _checked_times(world, observation, truth, times)
+        yield Step(observation, truth, control, decision)
         observation, number = world.step(control), number + 1
+
+
+def _checked_times(
+    world: World, observation: Observation, truth: Truth, before: tuple[float, float]
+) -> tuple[float, float]:
+    """The times (s) of observation and truth, which must have moved on: else no episode would end. before: those of the
+    last step. Raises ValueError."""
+    times = observation.time, truth.time
+    if not all(now - then >= world.dt / 2 and now < math.inf for now, then in zip(times, before, strict=True)):
+        raise ValueError(
+            f"found that {type(world).__name__} says {times[0]} s and {times[1]} s after {before[0]} s and "
+            f"{before[1]} s, wanted both moved on by {world.dt} s: correct its step and its truth"
+        )
+    if not all(map(math.isfinite, astuple(truth.ego.pose))):
+        raise ValueError(
+            f"found that {type(world).__name__} has its ego at {truth.ego.pose}, wanted numbers: correct its truth"
+        )
+    return times
 
 
 def run_episode(
