@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+Limits = Mapping[str, tuple[float, float]]  # from and to, both included, by the name of a setting
 
 MOST_SEED = 2**31 - 1  # a million times as much is still a seed for torch
 MOST_WORKERS = 1024
@@ -17,6 +21,13 @@ def require_within(option: str, value: float, low: float, high: float, usual: fl
     if not low <= value <= high:
         wanted = f"{low} or more" if high == math.inf else f"{low} to {high}"
         raise ValueError(f"found {option} {value}, wanted {wanted}: type {option} {usual}")
+
+
+def require_limits(values: Mapping[str, Any], limits: Limits, usual: Mapping[str, Any], group: str = "") -> None:
+    """Raises ValueError where one of the settings is not within its limits. usual: what to type instead; group: of the
+    options, such as augmentation in --augmentation.blur."""
+    for name, (low, high) in limits.items():
+        require_within(f"--{group and group + '.'}{name.replace('_', '-')}", values[name], low, high, usual[name])
 
 
 def require_writable_folder(folder: Path, option: str = "--out") -> None:

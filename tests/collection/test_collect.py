@@ -114,6 +114,15 @@ def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Pat
         ({"seed": -1}, "found --seed -1"),
         ({"cars": 400}, "found --cars 400"),
         ({"people": 40_000}, "found --people 40000"),
+        ({"crossing": -1.0}, "found --crossing -1"),
+        ({"before_signs": 1.5}, "found --before-signs 1.5, wanted 0.0 to 1.0: type --before-signs 0.35"),
+        ({"before_turns": math.nan}, "found --before-turns nan"),
+        ({"displaced": -0.1}, "found --displaced -0.1"),
+        ({"hidden_cars": 2.0}, "found --hidden-cars 2"),
+        ({"tailgating": 20.0}, "found --tailgating 20"),
+        ({"cars": 10**7}, r"found --cars 10000000, wanted 0 to \d+"),
+        ({"people": 10**9}, r"found --people 1000000000, wanted 0 to \d+"),
+        ({"episodes": 10**9}, "found --episodes 1000000000, wanted 1 to 100000"),
     ],
 )
 def test_what_cannot_be_recorded_is_said_before_anything_is_written(

@@ -13,7 +13,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from caldrive.checks import MOST_PIXELS, MOST_SEED, MOST_WORKERS, require_within
+from caldrive.checks import MOST_PIXELS, MOST_SEED, MOST_WORKERS, Limits, require_limits
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.recorder import record_episode
 from caldrive.driving.setup import make_world
@@ -28,9 +28,11 @@ from caldrive.world.scene.weather import weather
 from caldrive.world.traffic import sidewalks
 from caldrive.world.traffic import vehicles as traffic
 
-LIMITS = {  # of the options that are numbers
+LIMITS: Limits = {  # of the options that are numbers
     "episodes": (1, 100_000), "duration": (0.1, 3600.0), "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS),
-    "seed": (0, MOST_SEED), "randomised": (0.0, 1.0), "workers": (1, MOST_WORKERS),
+    "seed": (0, MOST_SEED), "workers": (1, MOST_WORKERS), "crossing": (0.0, 1000.0), "before_signs": (0.0, 1.0),
+    "before_turns": (0.0, 1.0), "displaced": (0.0, 1.0), "randomised": (0.0, 1.0), "hidden_cars": (0.0, 1.0),
+    "tailgating": (0.0, 1.0),
 }  # fmt: skip
 
 
@@ -78,15 +80,14 @@ def _record(config: CollectConfig, folder: Path, number: int) -> int:
 def _check(config: CollectConfig, workers: int) -> None:
     """Raises ValueError or FileNotFoundError for what cannot be recorded, before anything is written."""
     values, usual = asdict(config) | {"workers": workers}, asdict(CollectConfig()) | {"workers": 2}
-    for name, (low, high) in LIMITS.items():
-        require_within(f"--{name}", values[name], low, high, usual[name])
+    require_limits(values, LIMITS, usual)
     if not config.weathers:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 8 3 1 8 6")
     for number in config.weathers:
         weather(number)
     roads = load_roads(config.town)
-    for name, most in {"cars": traffic.room(roads), "people": sidewalks.room(roads)}.items():
-        require_within(f"--{name}", values[name], 0, most, min(most, usual[name]))
+    room = {"cars": (0, traffic.room(roads)), "people": (0, sidewalks.room(roads))}
+    require_limits(values, room, {name: min(most, usual[name]) for name, (_, most) in room.items()})
 
 
 def _claim(folder: Path, config: CollectConfig) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from caldrive.checks import require_within
+from caldrive.checks import require_limits
 
 SHARES = ("share", "rare_share", "plain", "noise")  # from 0 to 1; the other numbers are 0 or more
 
@@ -64,7 +64,5 @@ class RecolourConfig:
 
 def _check(config: AugmentationConfig | RecolourConfig, option: str) -> None:
     """Raises ValueError for a number that cannot be."""
-    for field in fields(config):
-        high = 1.0 if field.name in SHARES else math.inf
-        name = f"--{option}.{field.name.replace('_', '-')}"
-        require_within(name, getattr(config, field.name), 0, high, getattr(type(config), field.name))
+    limits = {field.name: (0, 1.0 if field.name in SHARES else math.inf) for field in fields(config)}
+    require_limits(vars(config), limits, vars(type(config)), option)

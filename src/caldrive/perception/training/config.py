@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from caldrive.checks import MOST_SEED, require_within
+from caldrive.checks import MOST_SEED, Limits, require_limits
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
 
 
@@ -32,7 +32,7 @@ class LossWeights:
 
 
 # What each number may be, from and to; a setting that is not here may be any number.
-LIMITS: dict[str, tuple[float, float]] = {
+LIMITS: Limits = {
     "steps": (1, 10_000_000),
     "batch": (1, 100_000),
     "window": (1, 1000),
@@ -109,9 +109,7 @@ class TrainingConfig:
     """Decides everything random."""
 
     def __post_init__(self) -> None:
-        for name, (low, high) in LIMITS.items():
-            usual = getattr(TrainingConfig, name)
-            require_within(f"--{name.replace('_', '-')}", getattr(self, name), low, high, usual)
+        require_limits(vars(self), LIMITS, vars(TrainingConfig))
         if self.initial and self.imagenet not in ("none", "cache"):
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
 
