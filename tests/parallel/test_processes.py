@@ -3,12 +3,14 @@ from __future__ import annotations
 import os
 import signal
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from functools import partial
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from caldrive.parallel.processes import parallel_map
@@ -106,3 +108,10 @@ def test_ctrl_c_ends_workers_without_a_word(
 
 def _spread_sleepers(folder: Path) -> None:
     list(parallel_map(partial(_sleeps, folder), range(2), 2))
+
+
+def test_a_result_is_kept_no_longer_than_whoever_asked_for_it_wants_it() -> None:
+    work = parallel_map(np.zeros, range(1, 9), 2)
+    kept = [weakref.ref(next(work)[1]) for _ in range(6)]
+    assert sum(result() is not None for result in kept) <= 1
+    work.close()  # type: ignore[attr-defined]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 from functools import partial
 from importlib.util import find_spec
@@ -9,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from caldrive.parallel.ray_cluster import cluster_map
+from caldrive.parallel.processes import GC_THRESHOLDS
+from caldrive.parallel.ray_cluster import _call, cluster_map
 from tests.parallel.work import dies_at_first, fails, square
 
 needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
@@ -38,3 +41,13 @@ def test_without_ray_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(RuntimeError, match=r"pip install 'caldrive\[ray\]'"):
         next(cluster_map(square, range(2), 2, "local"))
+
+
+def test_rays_workers_are_tuned_as_others_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("LP_NUM_THREADS", raising=False)
+    usual = gc.get_threshold()
+    try:
+        assert _call(lambda name: (os.environ[name], gc.get_threshold()), "LP_NUM_THREADS") == ("0", GC_THRESHOLDS)
+    finally:
+        gc.set_threshold(*usual)
+        monkeypatch.delenv("LP_NUM_THREADS", raising=False)

@@ -36,7 +36,8 @@ class Collect(Configurable):
         require_writable_folder(self.out)
         for _ in collect(self.recording, self.out, self.workers, progress):
             pass
-        counts = class_counts([read_episode(episode_path(self.out, k)) for k in range(self.recording.episodes)])
+        paths = (episode_path(self.out, k) for k in range(self.recording.episodes))
+        counts = class_counts([read_episode(path, images=False) for path in paths])
         return Answer({"out": str(self.out), "counts": counts}, counts_table(self.out, counts))
 
 

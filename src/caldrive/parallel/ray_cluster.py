@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from caldrive.parallel.processes import MAX_DEATHS
+from caldrive.parallel.processes import MAX_DEATHS, tune_process
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -50,6 +50,8 @@ def require_ray() -> Any:
 
 
 def _call(work: Callable[[Item], Result], item: Item) -> Result:
+    """What one of Ray's workers does."""
+    tune_process()
     return work(item)
 
 
