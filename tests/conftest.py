@@ -10,9 +10,10 @@ import pytest
 from caldrive.benchmark import runner
 from caldrive.perception.dataset.frames import Frames
 from caldrive.recordings.folder import find_episodes
+from caldrive.scenarios import TOWNS
 from caldrive.world.rendering.camera import CameraRig
 from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.roads.towns import TOWNS, load_roads
+from caldrive.world.roads.towns import load_roads
 from caldrive.world.town import load_town
 from caldrive.world.traffic.vehicles import stop_sumo
 from tests.perception.data import HEIGHT, WIDTH, record

@@ -14,6 +14,7 @@ MOST_SEED = 2**31 - 1  # a million times as much is still a seed for torch
 MOST_WORKERS = 1024
 MOST_PIXELS = 4096  # a side of an image
 MOST_LOOKS = 100  # of a town on one sheet
+MOST_AREA = 100_000_000  # pixels of a picture that somebody gives
 
 
 def require_within(option: str, value: float, low: float, high: float, usual: float) -> None:
@@ -28,6 +29,19 @@ def require_limits(values: Mapping[str, Any], limits: Limits, usual: Mapping[str
     options, such as augmentation in --augmentation.blur."""
     for name, (low, high) in limits.items():
         require_within(f"--{group and group + '.'}{name.replace('_', '-')}", values[name], low, high, usual[name])
+
+
+class TooLargeError(ValueError):
+    """A picture has more pixels than are read; the message says how many."""
+
+
+def require_picture_size(name: str, width: int, height: int) -> None:
+    """Raises TooLargeError where a picture, by what its first bytes say, would take more memory than anybody's does.
+    name: what to call it."""
+    if width * height > MOST_AREA:
+        raise TooLargeError(
+            f"found {name} of {width} x {height} pixels, wanted {MOST_AREA // 10**6} million at most: make it smaller"
+        )
 
 
 def require_writable_folder(folder: Path, option: str = "--out") -> None:

@@ -10,6 +10,8 @@ from caldrive.datatypes import Pose
 from caldrive.files import as_type
 
 MOST_SEED = 2**53  # that JSON keeps exactly, as a number in 64 bits
+TOWNS = ("town01", "town02")  # in the package; others are OpenDRIVE files
+WEATHERS = range(1, 15)  # CARLA's
 
 
 @dataclass(frozen=True)

@@ -111,3 +111,13 @@ def test_damaged_pictures_and_videos_are_named(tmp_path: Path) -> None:
         list(open_source(tmp_path / "bad.png"))
     with pytest.raises(ValueError, match=r"short.mp4 cannot be read as a video"):
         list(open_source(tmp_path / "short.mp4"))
+
+
+@pytest.mark.parametrize("side", [12_000, 60_000])
+def test_a_picture_that_asks_for_too_much_memory_is_refused_before_it_is_decoded(side: int, tmp_path: Path) -> None:
+    Picture.fromarray(halves()).save(tmp_path / "one.jpg")
+    jpeg = (tmp_path / "one.jpg").read_bytes()
+    at = jpeg.index(b"\xff\xc0") + 5
+    (tmp_path / "one.jpg").write_bytes(jpeg[:at] + struct.pack(">HH", side, side) + jpeg[at + 4 :])
+    with pytest.raises(ValueError, match=rf"one\.jpg of {side} x {side} pixels, wanted 100 million at most"):
+        list(open_source(tmp_path / "one.jpg"))

@@ -10,9 +10,10 @@ import pytest
 from caldrive.datatypes import Command
 from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, draw_routes, routes, task_scenarios
 from caldrive.geometry import wrap_angle
+from caldrive.scenarios import TOWNS
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route, plan_route
-from caldrive.world.roads.towns import TOWNS, load_roads
+from caldrive.world.roads.towns import load_roads
 
 LENGTHS = {  # shortest and longest route in m
     ("town01", "straight"): (90, 300), ("town01", "one-turn"): (130, 420), ("town01", "navigation"): (400, 1000),

@@ -47,12 +47,15 @@ def test_a_cut_file_and_a_broken_image_are_named_and_the_rest_is_counted(folder:
 def test_episodes_that_were_asked_for_and_are_not_there_are_counted(tmp_path: Path) -> None:
     record(tmp_path, n_episodes=1, n_frames=11)
     (tmp_path / "episode0.parquet").rename(tmp_path / "episode-00001.parquet")
-    (tmp_path / "manifest.json").write_text('{"episodes": 5}')
+    (tmp_path / "manifest.json").write_text('{"episodes": 5, "width": 64, "height": 32}')
     summary, _ = check_recording(tmp_path)
     assert (summary.episodes, summary.missing, summary.damaged) == (1, 4, ())
 
 
-@pytest.mark.parametrize("manifest", ["", "[1]", '{"episodes": "five"}', '{"episodes": -1}'])
+MANIFESTS = ["", "[1]", "{}", *(f'{{"episodes": {n}, "width": 64, "height": 32}}' for n in ('"five"', -1, 2.5, "true"))]
+
+
+@pytest.mark.parametrize("manifest", MANIFESTS)
 def test_a_damaged_manifest_is_named(folder: Path, manifest: str) -> None:
     (folder / "manifest.json").write_text(manifest)
     summary, _ = check_recording(folder)
@@ -67,7 +70,7 @@ def test_images_that_are_none_of_the_recorders_are_named(wrong: dict[str, Any], 
     sound = replace(make_frame(0), semantic=np.zeros((32, 64), np.uint8))
     with EpisodeWriter(tmp_path / "a.parquet", SCENARIO) as writer:
         writer.append(sound)
-        writer.append(replace(sound, index=1, **wrong))
+        writer.append(replace(sound, index=1, time=0.1, **wrong))
     summary, episodes = check_recording(tmp_path)
     assert not episodes
     assert "row 1 of" in summary.damaged[0]
@@ -101,3 +104,15 @@ def test_histograms_are_a_picture(folder: Path, tmp_path: Path) -> None:
 
 def test_every_continuous_affordance_has_its_histogram() -> None:
     assert {spec.name for spec in CONTINUOUS} <= set(BINS)
+
+
+def test_a_folder_that_asked_for_more_episodes_than_anyone_records_is_counted_at_once(folder: Path) -> None:
+    (folder / "manifest.json").write_text('{"episodes": 1000000000000, "width": 64, "height": 32}')
+    assert check_recording(folder)[0].missing == 10**12
+
+
+def test_images_of_another_size_than_their_folder_says_are_named(folder: Path) -> None:
+    (folder / "manifest.json").write_text('{"episodes": 2, "width": 200, "height": 88}')
+    summary, _ = check_recording(folder)
+    assert "images of 64 x 32, its folder says 200 x 88" in summary.damaged[0]
+    assert len(summary.damaged) == 2

@@ -2,8 +2,12 @@ from __future__ import annotations
 
 import json
 import math
+import struct
+import tracemalloc
+import zlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -11,6 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from caldrive.datatypes import Alternative, Command
+from caldrive.recordings import reader
 from caldrive.recordings.reader import read_episode
 from caldrive.recordings.writer import FORMAT_VERSION, EpisodeError, EpisodeWriter
 from caldrive.scenarios import scenario_from_values, scenario_values
@@ -157,3 +162,66 @@ def test_a_damaged_image_is_named_when_it_is_looked_at(path: Path) -> None:
     episode.jpegs[1] = b"no picture"
     with pytest.raises(EpisodeError, match="row 1"):
         episode.image(1)
+
+
+def test_without_images_an_episode_is_its_columns(path: Path) -> None:
+    whole, columns = read_episode(path), read_episode(path, images=False)
+    assert columns.jpegs == []
+    assert len(columns) == len(whole) == 6
+    assert columns.columns["center_distance"].tolist() == whole.columns["center_distance"].tolist()
+
+
+def _with_size(jpeg: bytes, width: int, height: int) -> bytes:
+    """A JPEG whose header says another size."""
+    at = jpeg.index(b"\xff\xc0") + 5
+    return jpeg[:at] + struct.pack(">HH", height, width) + jpeg[at + 4 :]
+
+
+def test_an_image_that_asks_for_too_much_memory_is_refused_before_it_is_decoded(path: Path) -> None:
+    episode = read_episode(path)
+    episode.jpegs[1] = _with_size(episode.jpegs[1], 60_000, 60_000)
+    with pytest.raises(EpisodeError, match=r"row 1 of .* damaged image") as caught:
+        episode.image(1)
+    assert "60000 x 60000 pixels, wanted 100 million at most" in str(caught.value.__cause__)
+
+
+def test_a_semantic_image_is_unpacked_no_further_than_its_image_is_large(path: Path) -> None:
+    episode = replace(read_episode(path), semantics=[zlib.compress(bytes(10**8))] * 6)
+    tracemalloc.start()
+    with pytest.raises(EpisodeError, match="damaged semantic image"):
+        episode.semantic(0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10**7
+
+
+@pytest.mark.parametrize("times", [(0.0, 0.1, 0.1), (0.0, 0.2, 0.1)], ids=["stands still", "goes back"])
+def test_a_time_that_does_not_go_on_is_named(times: tuple[float, ...], tmp_path: Path) -> None:
+    with EpisodeWriter(tmp_path / "drive.parquet", SCENARIO) as writer:
+        for index, time in enumerate(times):
+            writer.append(replace(make_frame(index), time=time))
+    with pytest.raises(EpisodeError, match=r"drive\.parquet has values in time that cannot be"):
+        read_episode(tmp_path / "drive.parquet")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"weather": 15}, "has weather 15, 1 to 14 can be"),
+        ({"town": "atlantis"}, "has town 'atlantis', town01, town02"),
+    ],
+)
+def test_conditions_that_no_recorder_knows_are_named(wrong: dict[str, Any], sentence: str, tmp_path: Path) -> None:
+    with EpisodeWriter(tmp_path / "drive.parquet", replace(SCENARIO, **wrong)) as writer:
+        writer.append(make_frame(0))
+    with pytest.raises(EpisodeError, match=sentence):
+        read_episode(tmp_path / "drive.parquet")
+
+
+def test_more_rows_than_there_is_memory_for_are_refused_before_they_are_read(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reader, "MOST_ROWS", 5)
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda *_: pytest.fail("read"))
+    with pytest.raises(EpisodeError, match="has 6 rows, 1 to 5 can be"):
+        read_episode(path)

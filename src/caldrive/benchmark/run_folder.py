@@ -23,7 +23,7 @@ from caldrive.benchmark.suites import SUITES, Trial, TrialResult, from_json, sui
 from caldrive.files import read_json, write_whole
 from caldrive.provenance import code_version, machine_name
 from caldrive.results import result_from_values
-from caldrive.world.roads.towns import TOWNS
+from caldrive.scenarios import TOWNS
 
 RUN = "run.json"
 

@@ -7,7 +7,7 @@ same files as an unbroken one.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import lru_cache, partial
 from pathlib import Path
@@ -17,11 +17,12 @@ from caldrive.checks import MOST_PIXELS, MOST_SEED, MOST_WORKERS, Limits, requir
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.recorder import record_episode
 from caldrive.driving.setup import make_world
-from caldrive.files import locked_folder, read_json, write_whole
+from caldrive.files import locked_folder, write_whole
 from caldrive.interfaces import RecordableWorld, is_recordable
 from caldrive.parallel.processes import parallel_map
 from caldrive.progress import Progress, silent
 from caldrive.provenance import code_version
+from caldrive.recordings.folder import Manifest, read_manifest
 from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, episode_path
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
@@ -93,28 +94,24 @@ def _check(config: CollectConfig, workers: int) -> None:
 def _claim(folder: Path, config: CollectConfig) -> None:
     """Writes down what is recorded in a folder. Raises ValueError where there are episodes of something else."""
     manifest = folder / MANIFEST
-    wanted = json.loads(json.dumps(asdict(config) | {"format": FORMAT_VERSION, "code": code_version()}))
+    wanted: dict[str, Any] = asdict(config) | {"weathers": list(config.weathers)}
+    wanted |= {"format": FORMAT_VERSION, "code": code_version()}
     if any(folder.glob("*.parquet")):
         recorded = _read_manifest(manifest)
         _require_same(folder, recorded, wanted)
-        wanted["episodes"] = max(n for n in (config.episodes, recorded.get("episodes")) if isinstance(n, int))
+        wanted["episodes"] = max(config.episodes, recorded["episodes"])
     write_whole(manifest, (json.dumps(wanted, indent=2) + "\n").encode())
 
 
-def _read_manifest(path: Path) -> dict[str, Any]:
+def _read_manifest(path: Path) -> Manifest:
     if not path.is_file():
         raise ValueError(
             f"found episodes in {path.parent}, but no {path.name} that says how they came: give another --out"
         )
-    try:
-        return read_json(path.read_bytes(), dict[str, Any])
-    except ValueError as error:
-        raise ValueError(
-            f"found that {path} is damaged ({error}), wanted a recording's settings: give another --out"
-        ) from error
+    return read_manifest(path)
 
 
-def _require_same(folder: Path, recorded: dict[str, Any], wanted: dict[str, Any]) -> None:
+def _require_same(folder: Path, recorded: Mapping[str, object], wanted: dict[str, Any]) -> None:
     for name, value in wanted.items():
         if name != "episodes" and recorded.get(name) != value:  # a recording may grow
             raise ValueError(

@@ -17,7 +17,7 @@ from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriveSettings
 from caldrive.driving.setup import set_up
 from caldrive.driving.trace import Trace, episode_json
-from caldrive.files import write_whole
+from caldrive.files import locked_folder, write_whole
 from caldrive.progress import Progress, silent
 from caldrive.results import EpisodeResult, Outcome, result_values
 from caldrive.scenarios import Scenario
@@ -60,7 +60,11 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
     show_truth = not agent_entry(settings.agent).privileged  # an oracle goes by the truth anyway
     world, agent = set_up(settings, settings.world)
     results, files = [], []
-    with closing(world), VideoWriter(settings.out / "drive.mp4", rate=1 / world.dt) as video:
+    with (
+        closing(world),
+        locked_folder(settings.out),
+        VideoWriter(settings.out / "drive.mp4", rate=1 / world.dt) as video,
+    ):
         for k, scenario in enumerate(scenarios):
             trace, referee = Trace(), Referee(scenario)
             text = caption(scenario, k + 1, len(scenarios))

@@ -15,8 +15,10 @@ import numpy as np
 from PIL import Image as Picture
 from PIL import ImageOps
 
+from caldrive.checks import TooLargeError, require_picture_size
 from caldrive.datatypes import DT, Image
 
+Picture.MAX_IMAGE_PIXELS = None  # Pillow's own limit, which only warns; ours comes before anything is decoded
 ENDINGS = (".png", ".jpg", ".jpeg")
 USUAL_RATE = 1 / DT  # pictures a second where nothing says how many: as the network learnt
 
@@ -78,8 +80,11 @@ def _natural(file: Path) -> list[str | int]:
 def _read_picture(file: Path) -> Image:
     try:
         with Picture.open(file) as picture:
+            require_picture_size(str(file), *picture.size)
             return np.asarray(ImageOps.exif_transpose(picture).convert("RGB"))
-    except (OSError, ValueError, SyntaxError, Picture.DecompressionBombError) as error:
+    except TooLargeError:
+        raise
+    except (OSError, ValueError, SyntaxError) as error:
         raise ValueError(
             f"found that {file} cannot be read as a picture, wanted a sound one: replace it, or take it out"
         ) from error
@@ -94,6 +99,7 @@ class VideoFile:
             if not container.streams.video:
                 raise ValueError(f"found no pictures in {path}, wanted a video: give another file")
             stream = container.streams.video[0]
+            require_picture_size(str(path), stream.width, stream.height)
             self.rate = float(stream.average_rate or stream.guessed_rate or USUAL_RATE)
             self.count = stream.frames or None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from caldrive.files import write_whole
 from caldrive.interfaces import BadImage, Perception
 from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.progress import Progress, silent
+from caldrive.recordings.writer import label_type, label_values
 from caldrive.visualization.episode_video import VideoWriter
 from caldrive.visualization.own_pictures import SeenFrames, SeenPicture
 
@@ -36,7 +37,7 @@ SCHEMA = pa.schema(
         ("picture", pa.int64()),
         ("file", pa.string()),
         ("time", pa.float64()),
-        *((spec.name, pa.int64() if spec.discrete and not spec.binary else pa.float64()) for spec in SPECS),
+        *((spec.name, label_type(spec)) for spec in SPECS),
         ("note", pa.string()),
     ]
 )
@@ -178,9 +179,7 @@ def _rate_notes(source: PictureSource) -> tuple[str, ...]:
 
 
 def _row(picture: SourcePicture, seen: SeenPicture) -> dict[str, Any]:
-    told = dict.fromkeys(spec.name for spec in SPECS) if seen.affordances is None else asdict(seen.affordances)
-    if seen.affordances is not None:
-        told["speed_sign"] = seen.affordances.speed_sign or 0
+    told = label_values(seen.affordances) if seen.affordances else dict.fromkeys(spec.name for spec in SPECS)
     return {"picture": picture.number, "file": picture.file, "time": picture.time, **told, "note": seen.note}
 
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from caldrive.datatypes import KMH, Command, Pose
 from caldrive.geometry import wrap_angle
-from caldrive.scenarios import Scenario
+from caldrive.scenarios import TOWNS, Scenario
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route, plan_route
-from caldrive.world.roads.towns import TOWNS, load_roads
+from caldrive.world.roads.towns import load_roads
 
 TASKS = ("straight", "one-turn", "navigation", "navigation-dynamic")
 ROUTES_PER_TASK = 25

@@ -6,18 +6,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Semantic
-from caldrive.files import read_json, write_figure
+from caldrive.files import write_figure
 from caldrive.progress import Progress, silent
-from caldrive.recordings.folder import class_counts, duplicates, episode_paths, joined
+from caldrive.recordings.folder import Manifest, class_counts, duplicates, episode_paths, joined, read_manifest
 from caldrive.recordings.reader import Episode, read_episode
-from caldrive.recordings.writer import MANIFEST, EpisodeError, episode_path
+from caldrive.recordings.writer import MANIFEST, EpisodeError
 
 Checked = TypeVar("Checked")
 
@@ -57,7 +58,8 @@ def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recordin
     """
     sound, damaged = _check_each(check_episode, episode_paths(folder), progress)
     damaged += duplicates(sound) + _of_another_size(sound)
-    missing, unreadable = _check_each(_missing, sorted(folder.glob(f"**/{MANIFEST}")))
+    folders, unreadable = _check_each(_read_folder, sorted(folder.glob(f"**/{MANIFEST}")))
+    damaged += chain.from_iterable(_not_as_declared(*one, sound) for one in folders)
     summary = RecordingSummary(
         episodes=len(sound),
         frames=sum(map(len, sound)),
@@ -65,7 +67,7 @@ def check_recording(folder: Path, progress: Progress = silent) -> tuple[Recordin
         weathers=dict(Counter(str(episode.scenario.weather) for episode in sound)),
         counts=class_counts(sound) if sound else {},
         damaged=(*damaged, *unreadable),
-        missing=sum(missing),
+        missing=sum(_missing(*one) for one in folders),
     )
     return summary, sound
 
@@ -82,16 +84,27 @@ def check_episode(path: Path) -> Episode:
     return replace(episode, semantics=None)
 
 
-def _missing(manifest: Path) -> int:
-    """How many of the episodes that `caldrive collect` was asked for are not in its folder. Raises EpisodeError where
-    nobody can read what was asked for."""
-    try:
-        wanted = read_json(manifest.read_bytes(), dict[str, Any]).get("episodes", 0)
-        if wanted < 0:
-            raise ValueError(f"{wanted} episodes")
-        return sum(not episode_path(manifest.parent, k).is_file() for k in range(wanted))
-    except (ValueError, TypeError) as error:
-        raise EpisodeError(f"{manifest} is damaged ({error}): record in another folder") from error
+def _read_folder(manifest: Path) -> tuple[Path, Manifest]:
+    """A folder of episodes, and what it says of itself. Raises EpisodeError where nobody can read that."""
+    return manifest.parent, read_manifest(manifest)
+
+
+def _missing(folder: Path, manifest: Manifest) -> int:
+    """How many of the episodes that `caldrive collect` was asked for are not in its folder."""
+    numbers = (path.stem.removeprefix("episode-") for path in folder.glob("episode-*.parquet"))
+    there = sum(number.isdecimal() and int(number) < manifest["episodes"] for number in numbers)
+    return manifest["episodes"] - there
+
+
+def _not_as_declared(folder: Path, manifest: Manifest, episodes: list[Episode]) -> list[str]:
+    """A sentence for each episode whose images have another size than its folder says."""
+    width, height = manifest["width"], manifest["height"]
+    return [
+        f"{episode.path} has images of {w} x {h}, its folder says {width} x {height}: remove it and record again"
+        for episode in episodes
+        for h, w in [episode.image(0).shape[:2]]
+        if episode.path.parent == folder and (h, w) != (height, width)
+    ]
 
 
 def _of_another_size(episodes: list[Episode]) -> list[str]:

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypedDict, cast
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.affordances import DISCRETE
 from caldrive.datatypes import HAZARD_DISTANCE
+from caldrive.files import read_json
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError
+
+Positive = Annotated[int, msgspec.Meta(gt=0)]
+
+
+class Manifest(TypedDict):
+    """What is read of a folder's settings: how many episodes were asked for, and the size of their images in pixels."""
+
+    episodes: Positive
+    width: Positive
+    height: Positive
 
 
 def episode_paths(folder: Path | str) -> list[Path]:
@@ -21,6 +33,19 @@ def episode_paths(folder: Path | str) -> list[Path]:
     if not paths:
         raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
     return paths
+
+
+def read_manifest(path: Path) -> Manifest:
+    """What a folder of episodes says of itself, with all other settings. Raises EpisodeError where it is damaged, lacks
+    a key or has one of another type."""
+    try:
+        content = path.read_bytes()
+        read_json(content, Manifest)
+        return cast(Manifest, read_json(content, dict[str, Any]))
+    except (OSError, ValueError) as error:
+        raise EpisodeError(
+            f"found that {path} is damaged ({error}), wanted a recording's settings: give another folder"
+        ) from error
 
 
 def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:

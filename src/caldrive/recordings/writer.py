@@ -32,11 +32,13 @@ JPEG_QUALITY = 90
 LABELS = tuple(spec.name for spec in SPECS)
 CONTROLS = tuple(field.name for field in fields(Control))
 OTHER_LABELS = tuple(spec.name for spec in CONDITIONAL)  # what another command would ask for
+IMAGE = "image"  # the column of the JPEGs
 FRAME_COLUMNS = ("camera", "camera_left", "camera_yaw", "time", "speed", "junction")  # fields of a Frame, as they are
 
 
-def _label_type(spec: AffordanceSpec) -> pa.DataType:
-    """Whole numbers for classes, such as the limits on signs, and floats for probabilities, m and rad."""
+def label_type(spec: AffordanceSpec) -> pa.DataType:
+    """Of an affordance's column: whole numbers for classes, such as the limits on signs, and floats for probabilities,
+    m and rad."""
     return pa.int64() if spec.discrete and not spec.binary else pa.float64()
 
 
@@ -50,9 +52,9 @@ SCHEMA = pa.schema(
         ("junction", pa.bool_()),
         ("other_command", pa.string()),  # empty where no other one could be given
         *((f"other_{name}", pa.float64()) for name in OTHER_LABELS),
-        *((spec.name, _label_type(spec)) for spec in SPECS),
+        *((spec.name, label_type(spec)) for spec in SPECS),
         *((f"{kind}_{name}", pa.float64()) for kind in ("driven", "clean") for name in CONTROLS),
-        ("image", pa.binary()),
+        (IMAGE, pa.binary()),
     ]
 )
 SEMANTIC = pa.field("semantic", pa.binary())  # only in recordings that were asked for it
@@ -101,13 +103,19 @@ class Frame:
     """What another command would ask for, if another one could be given."""
 
 
-def _row(episode_id: str, frame: Frame, quality: int) -> dict[str, Any]:
+def label_values(affordances: Affordances) -> dict[str, Any]:
+    """Affordances as a row has them: 0 for no speed sign."""
+    return {name: 0 if value is None else value for name, value in asdict(affordances).items()}
+
+
+def _row(episode_id: str, frame: Frame) -> dict[str, Any]:
     """A frame as a row of SCHEMA."""
     # 4:4:4 keeps the colour of lamps that are a pixel or two wide.
-    jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(frame.image), quality, colorspace="RGB", colorsubsampling="444")
-    row = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, "image": jpeg}
+    image = np.ascontiguousarray(frame.image)
+    jpeg = simplejpeg.encode_jpeg(image, JPEG_QUALITY, colorspace="RGB", colorsubsampling="444")
+    row = {"episode": episode_id, "frame": frame.index, "command": frame.command.value, IMAGE: jpeg}
     row |= {name: getattr(frame, name) for name in FRAME_COLUMNS}
-    row |= {name: 0 if value is None else value for name, value in asdict(frame.affordances).items()}  # 0 for no sign
+    row |= label_values(frame.affordances)
     row |= {f"driven_{name}": value for name, value in asdict(frame.driven).items()}
     row |= {f"clean_{name}": value for name, value in asdict(frame.clean).items()}
     row |= {f"other_{name}": getattr(frame.other, name) if frame.other else 0.0 for name in OTHER_LABELS}
@@ -123,16 +131,15 @@ class EpisodeWriter:
     Frames of one step may come camera by camera. An existing file of that name is replaced.
     """
 
-    def __init__(self, path: Path | str, scenario: Scenario, id: str = "", quality: int = JPEG_QUALITY) -> None:
+    def __init__(self, path: Path | str, scenario: Scenario, id: str = "") -> None:
         self.path = Path(path)
         self.scenario = scenario
         self.id = id or self.path.stem
-        self.quality = quality
         self._rows: list[dict[str, Any]] = []
 
     def append(self, frame: Frame) -> None:
         """One more frame."""
-        self._rows.append(_row(self.id, frame, self.quality))
+        self._rows.append(_row(self.id, frame))
 
     def close(self) -> None:
         """Write the file. Raises EpisodeError where no frame was appended."""
@@ -141,13 +148,13 @@ class EpisodeWriter:
         header = {"version": FORMAT_VERSION, "id": self.id, "scenario": json.dumps(scenario_values(self.scenario))}
         schema = SCHEMA.append(SEMANTIC) if SEMANTIC.name in self._rows[0] else SCHEMA
         schema = schema.with_metadata({METADATA_KEY: json.dumps(header).encode()})
-        columns = [name for name in schema.names if name != "image"]
+        columns = [name for name in schema.names if name != IMAGE]
         buffer = io.BytesIO()
         pq.write_table(
             pa.Table.from_pylist(self._rows, schema=schema),
             buffer,
             use_dictionary=["episode", "command", "other_command"],
-            compression=dict.fromkeys(columns, "zstd") | {"image": "none"},
+            compression=dict.fromkeys(columns, "zstd") | {IMAGE: "none"},
             write_page_checksum=True,  # a bit that turns over in an image mostly leaves a JPEG that can be decoded
         )
         write_whole(self.path, buffer.getvalue())

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
+from caldrive.scenarios import TOWNS
 from caldrive.world.roads.map_cache import digest, kept_network
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.sumo_reader import read_roads
 
-TOWNS = ("town01", "town02")
 MOST_MEGABYTES = 64  # of a map's file; cities of hundreds of kilometres of road have less
 
 _DATA = Path(__file__).parent / "data"

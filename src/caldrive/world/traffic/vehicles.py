@@ -57,6 +57,7 @@ class Traffic:
     def __init__(
         self, roads: RoadNetwork, n: int, seed: int, dt: float, ego: VehicleState, lights: TrafficLights
     ) -> None:
+        free_places(roads, n, ego.pose)  # too many cars are refused before anything is made for each
         self.roads, self.rng, self.dt = roads, np.random.default_rng(seed), dt
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
         starts = self._random_places(n, ego)
