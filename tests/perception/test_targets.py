@@ -12,7 +12,7 @@ from torch import Tensor
 
 from caldrive.affordances import CONDITIONAL, CONTINUOUS, DISCRETE, SPECS
 from caldrive.datatypes import Affordances
-from caldrive.perception.evaluation.evaluate import mean_iou, metrics
+from caldrive.perception.evaluation.evaluate import class_ious, confusion, mean_iou, metrics
 from caldrive.perception.targets import class_weights, decode, encode, multitask_loss, task_losses
 from caldrive.perception.training.config import LossWeights
 from caldrive.perception.training.multitask import SEGMENTATION
@@ -126,4 +126,11 @@ def test_metrics_are_in_si_units_and_scaled() -> None:
     figures = metrics(outputs, targets)
     assert figures["vehicle_distance/mae"] == pytest.approx(5.0, abs=1e-4)
     assert figures["vehicle_distance/mae_scaled"] == pytest.approx(0.1, abs=1e-6)
-    assert figures["speed_sign/iou"] == 1.0
+    assert figures["speed_sign/iou"] is None  # of one frame
+
+
+def test_what_never_occurred_has_no_iou() -> None:
+    none, once = torch.zeros(4, dtype=torch.long), torch.tensor([0, 0, 0, 2])
+    assert class_ious(confusion(none, once, 4)) == [0.75, None, 0.0, None]
+    assert mean_iou(none, none, 4) is None
+    assert mean_iou(once, once, 4) == 1.0

@@ -137,14 +137,19 @@ def _head(spec: AffordanceSpec) -> str:
     return f"{words}\nIoU %" if spec.discrete else f"{words}\n{spec.unit}"
 
 
-def _figures(figures: Mapping[str, float]) -> list[str]:
+def _figure(value: float | None, scale: float = 1.0) -> str:
+    """Three digits, or a dash where there is no figure."""
+    return "-" if value is None else f"{value * scale:.3g}"
+
+
+def _figures(figures: Mapping[str, float | None]) -> list[str]:
     """One cell for each affordance, in percent or in SI units."""
-    return [f"{(100 if spec.discrete else 1) * figures[spec.metric]:.3g}" for spec in SPECS]
+    return [_figure(figures[spec.metric], 100 if spec.discrete else 1) for spec in SPECS]
 
 
-def _scaled(figures: Mapping[str, float]) -> list[str]:
+def _scaled(figures: Mapping[str, float | None]) -> list[str]:
     """Errors of the continuous affordances in units of their scale, as the supplement prints them."""
-    return ["" if spec.discrete else f"{figures[spec.metric] / spec.scale:.3g}" for spec in SPECS]
+    return ["" if spec.discrete else _figure(figures[spec.metric], 1 / spec.scale) for spec in SPECS]
 
 
 def evaluation_table(report: Report, precision: str) -> Group:
@@ -154,19 +159,21 @@ def evaluation_table(report: Report, precision: str) -> Group:
     table = Table("", *map(_head, SPECS), box=SIMPLE_HEAD)
     for column in table.columns:
         column.no_wrap = True
-    rows = {"all frames": report.overall, "the paper, in CARLA": published_figures()}
+    rows: dict[str, Mapping[str, float | None]] = {"all frames": report.overall}
+    rows["the paper, in CARLA"] = published_figures()
     rows |= {f"{kind} {value}": row for kind, values in report.groups.items() for value, row in values.items()}
     for name, figures in rows.items():
         table.add_row(name, *_figures(figures))
     table.add_row("all, scaled", *_scaled(report.overall))
     table.add_row("the paper, scaled", *_scaled(published_figures()))
     head = Text(f"{report.frames} frames, in {precision}")
-    return Group(head, table, *(_confusion(name, counts) for name, counts in report.confusion.items()))
+    return Group(head, table, *(_confusion(name, report) for name in report.confusion))
 
 
-def _confusion(name: str, counts: list[list[int]]) -> Table:
+def _confusion(name: str, report: Report) -> Table:
+    """How many of each class were seen as each, and each class's IoU; a dash for one that never occurred."""
     classes = BY_NAME[name].classes
-    table = Table(f"{BY_NAME[name].title}, true", *(f"seen as {c}" for c in classes), box=SIMPLE_HEAD)
-    for c, row in zip(classes, counts, strict=True):
-        table.add_row(str(c), *map(str, row))
+    table = Table(f"{BY_NAME[name].title}, true", *(f"seen as {c}" for c in classes), "IoU %", box=SIMPLE_HEAD)
+    for c, row, iou in zip(classes, report.confusion[name], report.class_iou[name], strict=True):
+        table.add_row(str(c), *map(str, row), _figure(iou, 100))
     return table

@@ -36,6 +36,11 @@ def si_values(spec: AffordanceSpec, output: Tensor) -> Tensor:
     return (output[:, 0].float() * spec.scale).clamp(spec.low, spec.high)
 
 
+def si_error(spec: AffordanceSpec, output: Tensor, target: Tensor) -> Tensor:
+    """Absolute errors (N,) of outputs (N, 1) in SI units; a value beyond the range counts as its end."""
+    return (si_values(spec, output) - target * spec.scale).abs()
+
+
 def scaled_error(spec: AffordanceSpec, output: Tensor, target: Tensor) -> Tensor:
     """Absolute errors (N,) of scaled outputs (N, 1). A target at a limit of the range stands for all beyond it, as
     decoding does: an output there is right."""

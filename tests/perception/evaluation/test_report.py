@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from caldrive.affordances import BY_NAME
+from caldrive.commands.tables import evaluation_table
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import outputs_on
 from caldrive.perception.evaluation.report import (
@@ -46,7 +48,7 @@ def test_errors_are_told_apart_by_what_is_ahead_and_by_place_and_by_the_cameras_
     cars = evaluation.groups["car ahead"]
     assert list(cars) == ["00 to 03 m", "03 to 06 m", "06 to 12 m", "12 to 25 m", "25 to 50 m", "none"]
     weights = dict(zip(cars, (1, 2, 1, 1, 1, 2), strict=True))
-    mean = sum(n * cars[name]["vehicle_distance/mae"] for name, n in weights.items()) / len(AHEAD)
+    mean = sum(n * (cars[name]["vehicle_distance/mae"] or 0.0) for name, n in weights.items()) / len(AHEAD)
     assert mean == pytest.approx(evaluation.overall["vehicle_distance/mae"], rel=1e-4)
     wrong = errors(DISTANCE, *outputs_on(network, frames, network.features))
     assert cars["00 to 03 m"]["vehicle_distance/mae"] == pytest.approx(wrong[0], rel=1e-4)
@@ -107,3 +109,18 @@ def test_the_papers_figures_stand_beside_a_networks_by_the_same_names(frames: Fr
     assert published_metrics()["vehicle_distance/mae_scaled"] == 0.03289
     assert published_figures()["vehicle_distance/mae"] == pytest.approx(50 * 0.03289)
     assert published_figures()["red_light/iou"] == published_metrics()["red_light/iou"] == 0.9395
+
+
+def test_a_class_that_never_occurred_has_no_figure_in_json_and_a_dash_in_the_table(frames: Frames) -> None:
+    network = Network(TINY).eval()
+    for name in ("red_light", "speed_sign"):
+        network.get_parameter(f"blocks.{name}.groups.0.output.bias").data[0] = 1e6  # never seen, and never there
+    evaluation = report(network, frames, network.features)
+    assert evaluation.overall["red_light/iou"] is None
+    assert evaluation.groups["command"]["left"]["speed_sign/iou"] is None
+    assert evaluation.class_iou["red_light"] == [1.0, None]
+    console = Console(width=200)
+    with console.capture() as shown:
+        console.print(evaluation_table(evaluation, "fp32"))
+    line = next(line for line in shown.get().splitlines() if line.strip().startswith("all frames"))
+    assert line.split()[3:5] == ["-", "-"]

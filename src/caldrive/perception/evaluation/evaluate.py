@@ -11,7 +11,7 @@ from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import BackboneEngine, autocast
 from caldrive.perception.network.network import Network
-from caldrive.perception.targets import Outputs, Targets, si_values, task_losses
+from caldrive.perception.targets import Outputs, Targets, si_error, task_losses
 from caldrive.progress import Progress, silent
 
 FRAMES_A_PASS = 128
@@ -22,24 +22,31 @@ def confusion(predicted: Tensor, target: Tensor, n_classes: int) -> Tensor:
     return torch.bincount(target * n_classes + predicted, minlength=n_classes**2).view(n_classes, n_classes)
 
 
-def mean_iou(predicted: Tensor, target: Tensor, n_classes: int) -> float:
-    """Mean over the classes that occur of intersection over union of predicted and true samples (N,)."""
-    counts = confusion(predicted, target, n_classes).double()
-    hits = counts.diagonal()
-    union = counts.sum(0) + counts.sum(1) - hits
-    return float((hits[union > 0] / union[union > 0]).mean())
+def class_ious(counts: Tensor) -> list[float | None]:
+    """Intersection over union of predicted and true samples of each class, by the counts (K, K) of `confusion`; None
+    for a class that never occurred, neither in truth nor predicted."""
+    hits = counts.double().diagonal()
+    unions = counts.double().sum(0) + counts.double().sum(1) - hits
+    return [float(hit / union) if union else None for hit, union in zip(hits, unions, strict=True)]
 
 
-def metrics(outputs: Outputs, targets: Targets) -> dict[str, float]:
-    """`<name>/iou` for the discrete; `<name>/mae` in SI units and `<name>/mae_scaled` for the continuous
+def mean_iou(predicted: Tensor, target: Tensor, n_classes: int) -> float | None:
+    """Mean of `class_ious` over the classes that occur among samples (N,). None where only one does: who always says
+    the same of what is always the same has shown nothing."""
+    occurring = [iou for iou in class_ious(confusion(predicted, target, n_classes)) if iou is not None]
+    return float(torch.tensor(occurring, dtype=torch.float64).mean()) if len(occurring) > 1 else None
+
+
+def metrics(outputs: Outputs, targets: Targets) -> dict[str, float | None]:
+    """`<name>/iou` for the discrete, by `mean_iou`; `<name>/mae` in SI units and `<name>/mae_scaled` for the continuous
     affordances."""
-    figures: dict[str, float] = {}
+    figures: dict[str, float | None] = {}
     for spec in SPECS:
         output, target = outputs[spec.name], targets[spec.name]
         if spec.discrete:
             figures[spec.metric] = mean_iou(output.argmax(1), target, spec.outputs)
         else:
-            error = float((si_values(spec, output) - target * spec.scale).abs().mean())
+            error = float(si_error(spec, output, target).mean())
             figures[spec.metric] = error
             figures[f"{spec.metric}_scaled"] = error / spec.scale
     return figures
@@ -73,7 +80,8 @@ def outputs_on(
 def evaluate(
     network: Network, frames: Frames, precision: str = "auto", device: str = "cpu", context: int | None = None
 ) -> dict[str, float]:
-    """Metrics over all frames, and each affordance's unweighted loss as `<name>/loss`, their sum as `loss`.
+    """The metrics over all frames, where they show any, and each affordance's unweighted loss as `<name>/loss`, their
+    sum as `loss`.
 
     precision: auto, fp32 or bf16. context: as in `outputs_on`.
     """
@@ -84,4 +92,5 @@ def evaluate(
 
     outputs, targets = outputs_on(network, frames, backbone, device, context=context)
     losses = {f"{name}/loss": float(value) for name, value in task_losses(outputs, targets).items()}
-    return {"loss": sum(losses.values())} | losses | metrics(outputs, targets)
+    figures = {name: value for name, value in metrics(outputs, targets).items() if value is not None}
+    return {"loss": sum(losses.values())} | losses | figures

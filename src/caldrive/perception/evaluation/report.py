@@ -16,10 +16,10 @@ from caldrive.affordances import BY_NAME, DISCRETE, SPECS, AffordanceSpec
 from caldrive.files import write_figure
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.dataset.sampler import SIZE_EDGES
-from caldrive.perception.evaluation.evaluate import confusion, metrics, outputs_on
+from caldrive.perception.evaluation.evaluate import class_ious, confusion, metrics, outputs_on
 from caldrive.perception.inference.engines import BackboneEngine
 from caldrive.perception.network.network import COMMANDS, Network
-from caldrive.perception.targets import Outputs, Targets, si_values
+from caldrive.perception.targets import Outputs, Targets, si_error, si_values
 from caldrive.progress import Progress, silent
 
 # Supplement, comparison of temporal and non-temporal task blocks, the better of the two: mean IoU of the discrete, mean
@@ -39,11 +39,7 @@ YAW_EDGES = (5.0, 10.0)  # degrees; a car looks straight ahead, cameras of a rec
 
 def published_metrics() -> dict[str, float]:
     """The paper's figures as it prints them, by the names that `metrics` gives them."""
-    return {
-        spec.metric if spec.discrete else f"{spec.metric}_scaled": PUBLISHED[spec.name]
-        for spec in SPECS
-        if spec.name in PUBLISHED
-    }
+    return {spec.metric if spec.discrete else f"{spec.metric}_scaled": PUBLISHED[spec.name] for spec in SPECS}
 
 
 def published_figures() -> dict[str, float]:
@@ -53,14 +49,16 @@ def published_figures() -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Report:
-    """frames: how many. overall: metrics by name. groups: by command, weather, town, place, distance of the car ahead
-    and how far the camera is turned, the same for each value.
-    confusion: for each discrete affordance how many frames of each true class (rows) were seen as each (columns)."""
+    """frames: how many. overall: metrics by name, None where the frames show none. groups: by command, weather, town,
+    place, distance of the car ahead and how far the camera is turned, the same for each value. confusion: for each
+    discrete affordance how many frames of each true class (rows) were seen as each (columns). class_iou: intersection
+    over union of each class, None for one that never occurred, neither true nor seen."""
 
     frames: int
-    overall: dict[str, float]
-    groups: dict[str, dict[str, dict[str, float]]]
+    overall: dict[str, float | None]
+    groups: dict[str, dict[str, dict[str, float | None]]]
     confusion: dict[str, list[list[int]]]
+    class_iou: dict[str, list[float | None]]
 
 
 def report(
@@ -74,12 +72,17 @@ def report(
         rows = {str(label): labels == label for label in np.unique(labels)}
         groups[name] = {label: metrics(_part(outputs, row), _part(targets, row)) for label, row in rows.items()}
     confusions = {
-        spec.name: confusion(outputs[spec.name].argmax(1), targets[spec.name], spec.outputs).tolist()
-        for spec in DISCRETE
+        spec.name: confusion(outputs[spec.name].argmax(1), targets[spec.name], spec.outputs) for spec in DISCRETE
     }
     if picture is not None:
         draw_worst(frames, outputs, targets, picture)
-    return Report(len(frames), metrics(outputs, targets), groups, confusions)
+    return Report(
+        frames=len(frames),
+        overall=metrics(outputs, targets),
+        groups=groups,
+        confusion={name: counts.tolist() for name, counts in confusions.items()},
+        class_iou={name: class_ious(counts) for name, counts in confusions.items()},
+    )
 
 
 def _group_labels(frames: Frames) -> dict[str, NDArray[Any]]:
@@ -112,7 +115,7 @@ def errors(spec: AffordanceSpec, outputs: Outputs, targets: Targets) -> NDArray[
     output, target = outputs[spec.name], targets[spec.name]
     if spec.discrete:
         return np.asarray(1 - output.softmax(1).gather(1, target[:, None])[:, 0].double())
-    return np.asarray((si_values(spec, output) - target * spec.scale).abs().double())
+    return np.asarray(si_error(spec, output, target).double())
 
 
 def worst(error: NDArray[np.float64], frames: Frames) -> list[int]:
