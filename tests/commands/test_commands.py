@@ -42,7 +42,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> str:
     torch.manual_seed(0)
     config = NetworkConfig(64, 32, 0.0625, vehicle_distance=BlockConfig("gru", 8, 0.0, length=3))
     path = tmp_path_factory.mktemp("model") / "random.safetensors"
-    save_network(path, Network(config), CheckpointInfo(config))
+    save_network(path, Network(config), CheckpointInfo(config, ranges=(3.0,) * 13))
     return str(path)
 
 

@@ -62,7 +62,14 @@ def make_cal(settings: AgentSettings, dt: float, threads: int | None = 1) -> CAL
 def _cal_camera(settings: AgentSettings) -> CameraConfig:
     from caldrive.perception.network.checkpoint import read_info
 
-    network = read_info(model_path(settings.model)).config
+    path = model_path(settings.model)
+    info = read_info(path)
+    if not info.ranges:
+        raise ValueError(
+            f"found no ranges for 8-bit integers in {path}, without which an image takes many times as long, wanted "
+            "those that every training finds: train it again"
+        )
+    network = info.config
     return CameraConfig(width=network.image_width, height=network.image_height)
 
 
@@ -71,7 +78,7 @@ def _cal_provenance(settings: AgentSettings) -> dict[str, Any]:
     from caldrive.perception.network.checkpoint import read_info
 
     path = model_path(settings.model)
-    return {"model": file_digest(path), "precision": driving_precision("auto", read_info(path))}
+    return {"model": file_digest(path), "precision": driving_precision("auto", read_info(path).ranges)}
 
 
 def _make_oracle(settings: AgentSettings, dt: float, truth: TruthSource | None) -> CALAgent:

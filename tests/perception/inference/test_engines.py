@@ -6,10 +6,6 @@ import pytest
 import torch
 
 from caldrive.perception.inference.engines import driving_precision, use_bf16
-from caldrive.perception.network.checkpoint import (
-    CheckpointInfo,
-)
-from tests.perception.data import TINY
 
 
 def test_an_unknown_precision_is_named() -> None:
@@ -42,11 +38,11 @@ def test_each_processor_drives_in_the_integers_that_it_adds_right(
     capabilities: dict[str, bool], precision: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("torch.cpu.get_capabilities", lambda: capabilities)
-    assert driving_precision("auto", CheckpointInfo(TINY, ranges=(1.0,) * 13)) == precision
+    assert driving_precision("auto", (1.0,) * 13) == precision
 
 
 def test_eight_bits_need_ranges() -> None:
-    without, with_ranges = CheckpointInfo(TINY), CheckpointInfo(TINY, ranges=(1.0,) * 13)
+    without, with_ranges = (), (1.0,) * 13
     assert driving_precision("fp32", with_ranges) == "fp32"
     assert driving_precision("auto", without) in ("fp32", "bf16")
     with pytest.raises(ValueError, match="ranges"):

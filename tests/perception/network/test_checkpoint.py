@@ -16,6 +16,7 @@ from caldrive.perception.network.checkpoint import (
     CheckpointError,
     CheckpointInfo,
     load_network,
+    read_info,
     save_network,
     write_tensors,
 )
@@ -145,4 +146,45 @@ def test_a_header_of_nothing_is_foreign(tmp_path: Path) -> None:
 def test_ranges_that_hold_nothing_are_refused(size: float, network: Network, tmp_path: Path) -> None:
     save_network(tmp_path / "model.safetensors", network, replace(INFO, ranges=(size,) * 13))
     with pytest.raises(CheckpointError, match="not more than 0"):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_what_is_known_of_a_network_is_read_without_its_weights(
+    network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save_network(tmp_path / "model.safetensors", network, INFO)
+    monkeypatch.setattr(Path, "read_bytes", lambda path: pytest.fail(f"read all of {path}"))
+    assert read_info(tmp_path / "model.safetensors") == INFO
+
+
+def test_settings_that_ask_for_more_memory_than_there_is_are_refused_before_it_is_taken(
+    network: Network, tmp_path: Path
+) -> None:
+    huge = replace(TINY, width=10.0, image_width=4096, image_height=4096)  # features of 300 MB an image
+    huge = replace(huge, red_light=replace(huge.red_light, nodes=10_000))  # and 9 TB of weights for them
+    save_network(tmp_path / "model.safetensors", network, replace(INFO, config=huge))
+    with pytest.raises(CheckpointError, match="do not fit its own settings"):
+        load_network(tmp_path / "model.safetensors")
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, 1e-40])
+def test_weights_that_are_all_alike_are_refused(value: float, network: Network, tmp_path: Path) -> None:
+    network.get_parameter("blocks.speed_sign.groups.0.layer.weight").data[:] = value
+    save_network(tmp_path / "model.safetensors", network, INFO)
+    with pytest.raises(
+        CheckpointError, match=r"weights blocks\.speed_sign\.groups\.0\.layer\.weight that are all alike"
+    ):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_a_norm_that_lets_nothing_through_is_refused(network: Network, tmp_path: Path) -> None:
+    network.get_parameter("backbone.norms.4.weight").data[:] = 0.0
+    save_network(tmp_path / "model.safetensors", network, INFO)
+    with pytest.raises(CheckpointError, match=r"backbone\.norms\.4\.weight that are all alike"):
+        load_network(tmp_path / "model.safetensors")
+
+
+def test_ranges_of_another_backbone_are_refused(network: Network, tmp_path: Path) -> None:
+    save_network(tmp_path / "model.safetensors", network, replace(INFO, ranges=(1.0,) * 3))
+    with pytest.raises(CheckpointError, match="3 ranges of integers for 13 convolutions"):
         load_network(tmp_path / "model.safetensors")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from caldrive.perception.network.checkpoint import CheckpointInfo
 from caldrive.perception.network.network import Network
 
 BackboneEngine = Callable[[Tensor], Tensor]  # normalised images (N, 3, H, W) to features (N, F)
@@ -51,35 +50,36 @@ def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
     return torch.autocast(device.split(":")[0], torch.bfloat16) if use_bf16(precision, device) else nullcontext()
 
 
-def driving_precision(wanted: str, info: CheckpointInfo) -> str:
-    """fp32, bf16, int8 or int7. `auto` is int8 or int7 where the network's ranges are known and the processor is fast
-    with integers, else what is faster of the others.
+def driving_precision(wanted: str, ranges: Sequence[float]) -> str:
+    """fp32, bf16, int8 or int7. `auto` is int8 or int7 where the network's ranges are known (not empty) and the
+    processor is fast with integers, else what is faster of the others.
 
     Raises ValueError for another word, and for integers without ranges.
     """
     if wanted not in PRECISIONS:
         raise ValueError(f"found precision {wanted!r}, wanted one of {', '.join(PRECISIONS)}: type --precision auto")
     if wanted in INTEGERS:
-        if not info.ranges:
+        if not ranges:
             raise ValueError(
                 "found a network without the ranges that int8 needs: train it again, or type --precision fp32"
             )
         return wanted
-    integers = _fast_integers() if wanted == "auto" and info.ranges else None
+    integers = _fast_integers() if wanted == "auto" and ranges else None
     return integers or ("bf16" if use_bf16(wanted, "cpu") else "fp32")
 
 
 def backbone_engine(
-    precision: str, network: Network, info: CheckpointInfo, threads: int | None = None
+    precision: str, network: Network, ranges: Sequence[float], threads: int | None = None
 ) -> BackboneEngine:
-    """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own. threads: for integers, as many
+    """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own. ranges: by
+    `calibration.input_ranges`, which integers need. threads: for integers, as many
     as torch has without it."""
     if precision in INTEGERS:
         from caldrive.perception.inference.openvino_engine import Int8Backbone  # OpenVINO, which only integers need
 
         threads = threads or torch.get_num_threads()
         size, bits = network.config.image_size, INTEGERS[precision]
-        return Int8Backbone(network.backbone, info.ranges, size, threads=threads, bits=bits)
+        return Int8Backbone(network.backbone, ranges, size, threads=threads, bits=bits)
     dtype = torch.bfloat16 if precision == "bf16" else torch.float32
     network.backbone.to(dtype)
     return lambda images: network.features(images.to(dtype)).float()

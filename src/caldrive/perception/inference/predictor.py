@@ -29,10 +29,10 @@ class NetworkPerception:
             info = CheckpointInfo(network.config)
         else:
             network, info = load_network(network)
-        self.network, precision = network.eval(), driving_precision(precision, info)
+        self.network, precision = network.eval(), driving_precision(precision, info.ranges)
         if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
             torch.set_num_threads(1 if precision in INTEGERS else threads)
-        self._backbone = backbone_engine(precision, network, info, threads)
+        self._backbone = backbone_engine(precision, network, info.ranges, threads)
         self._blocks = blocks_engine(precision, network, threads)
         self._history: Tensor | None = None  # (1, span, F)
 

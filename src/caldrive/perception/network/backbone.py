@@ -40,7 +40,6 @@ class Backbone(nn.Module):
             self.stages.append(nn.ModuleList(nn.Conv2d(a, b, 3, padding=1) for a, b in pairwise(sizes)))
             self.norms.append(nn.BatchNorm2d(n_out) if batch_norm else nn.Identity())
             n_in = n_out
-        self.n_channels = n_in
         for conv in self.convolutions():
             nn.init.kaiming_normal_(conv.weight, nonlinearity="relu")
             conv.weight.data = conv.weight.data.contiguous(memory_format=torch.channels_last)
@@ -51,7 +50,7 @@ class Backbone(nn.Module):
 
     def n_features(self, height: int, width: int) -> int:
         """F for an image of this size."""
-        return self.n_channels * (height // 32) * (width // 32)
+        return self.channels[-1] * (height // 32) * (width // 32)
 
     def forward(self, images: Tensor) -> Tensor:
         """Images (N, 3, H, W) to features (N, F)."""

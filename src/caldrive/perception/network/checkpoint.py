@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import json
 import math
-import struct
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
 
 import torch
-from safetensors import SafetensorError
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import load, save
 from torch import Tensor
 
@@ -24,6 +23,8 @@ from caldrive.perception.network.network import Network
 
 FORMAT_VERSION = 2
 KEY = "caldrive"  # of the JSON in safetensors' metadata
+UNFINISHED = "unfinished.safetensors"  # a network in the folder of a training that goes on
+SMALLEST_SPREAD = 1e-12  # of the values of a matrix of weights; the smallest that 16 bits tell apart is 6e-8
 
 
 class DataSummary(TypedDict, total=False):
@@ -63,18 +64,18 @@ def write_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any]
     write_whole(path, save(contiguous, metadata={KEY: text}))
 
 
-def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Tensors and header of a file by `write_tensors`. Raises CheckpointError where it is missing, damaged or
-    foreign."""
+def read_header(path: Path) -> dict[str, Any]:
+    """Header of a file by `write_tensors`; of its tensors only the names are read.
+
+    Raises CheckpointError where it is missing, damaged or foreign.
+    """
     if not path.is_file():
-        raise CheckpointError(f"found no file {path}, wanted a network: check the name, or type caldrive train")
-    content = path.read_bytes()
+        raise CheckpointError(_missing(path))
     try:
-        tensors = load(content)
-        size = struct.unpack("<Q", content[:8])[0]
-        metadata = read_json(content[8 : 8 + size], dict[str, Any]).get("__metadata__") or {}
+        with safe_open(path, "pt") as file:
+            metadata = file.metadata() or {}
         header = read_json(metadata[KEY], dict[str, Any]) if KEY in metadata else None
-    except (SafetensorError, ValueError, struct.error) as error:
+    except (SafetensorError, OSError, ValueError) as error:
         raise CheckpointError(
             f"found that {path} is damaged or no safetensors file, wanted a whole one: copy it again, or train again"
         ) from error
@@ -86,7 +87,24 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         raise CheckpointError(
             f"found format {header.get('version')} in {path}, wanted {FORMAT_VERSION}: train the network again"
         )
-    return tensors, header
+    return header
+
+
+def _missing(path: Path) -> str:
+    """A sentence on a file that is not there."""
+    unfinished = path.with_name(UNFINISHED)
+    if path != unfinished and unfinished.is_file():
+        return (
+            f"found a training in {path.parent} that is not finished, wanted its network {path.name}: type caldrive "
+            f"train as before, or give {unfinished} as it is"
+        )
+    return f"found no file {path}, wanted a network: check the name, or type caldrive train"
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Tensors and header of a file by `write_tensors`. Raises CheckpointError as `read_header`."""
+    header = read_header(path)
+    return load(path.read_bytes()), header
 
 
 def _is_weight(value: Tensor) -> bool:
@@ -109,46 +127,57 @@ def save_network(path: Path | str, network: Network, info: CheckpointInfo, half:
     write_tensors(Path(path), state, {"kind": "network", "specs": describe()} | asdict(info))
 
 
-def _read_network(path: Path) -> tuple[dict[str, Tensor], CheckpointInfo]:
-    """Weights, and what is known of them. Raises CheckpointError where they are no network of this code's kind."""
-    tensors, header = read_tensors(path)
+def read_info(path: Path | str) -> CheckpointInfo:
+    """What is known of a network; its weights are not read. Raises CheckpointError where it is none of this code's
+    kind."""
+    path = Path(path)
+    header = read_header(path)
     if header.get("kind") != "network":
         raise CheckpointError(
             f"found part of a training in {path}, wanted a finished network: give its model.safetensors"
         )
-    if header.get("specs") != json.loads(json.dumps(describe())):
+    if header.get("specs") != describe():
         raise CheckpointError(
             f"found in {path} a network for other affordances, wanted those of this caldrive: train the network again"
         )
     try:
         names = {part.name for part in fields(CheckpointInfo)}
-        return tensors, as_type({name: header[name] for name in header.keys() & names}, CheckpointInfo)
+        return as_type({name: header[name] for name in header.keys() & names}, CheckpointInfo)
     except (KeyError, TypeError, ValueError) as error:
         raise CheckpointError(
             f"found in {path} a header that cannot be read ({error}), wanted a training's: train the network again"
         ) from error
 
 
-def read_info(path: Path | str) -> CheckpointInfo:
-    """What is known of a network. Raises CheckpointError as `load_network`."""
-    return _read_network(Path(path))[1]
-
-
 def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
     """Read a network, ready for evaluation, and what is known of it. Raises CheckpointError where it does not fit this
-    code."""
+    code, or cannot be what a training leaves."""
     path = Path(path)
-    tensors, info = _read_network(path)
-    try:
-        network = Network(info.config)
-        network.load_state_dict({k: v.float() if v.dtype == torch.float16 else v for k, v in tensors.items()})
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise CheckpointError(
-            f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
-        ) from error
+    info = read_info(path)
+    _require_shapes(path, info.config)
+    network = Network(info.config)
+    network.load_state_dict({name: _single(value) for name, value in load(path.read_bytes()).items()})
     if fault := _fault(network, info):
         raise CheckpointError(f"found in {path} {fault}, wanted a trained network: train it again")
     return network.eval(), info
+
+
+def _single(value: Tensor) -> Tensor:
+    return value.float() if value.dtype == torch.float16 else value
+
+
+def _require_shapes(path: Path, config: NetworkConfig) -> None:
+    """Raises CheckpointError where a file's tensors are not those of its settings. Nothing is allocated: settings may
+    ask for more than there is memory."""
+    with torch.device("meta"):
+        wanted = {name: list(value.shape) for name, value in Network(config).state_dict().items()}
+    with safe_open(path, "pt") as file:
+        names = file.keys()
+        found = {name: file.get_slice(name).get_shape() for name in names}
+    if found != wanted:
+        raise CheckpointError(
+            f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
+        )
 
 
 def _fault(network: Network, info: CheckpointInfo) -> str:
@@ -158,10 +187,21 @@ def _fault(network: Network, info: CheckpointInfo) -> str:
         return "weights that are not numbers"
     if any(bool((value < 0).any()) for name, value in state.items() if name.endswith("running_var")):
         return "variances less than 0"
+    if alike := [name for name, value in state.items() if ".weight" in name and _is_constant(value)]:
+        return f"weights {alike[0]} that are all alike"
     if not all(0 < size < math.inf for size in info.ranges):
         return "ranges of integers that are not more than 0"
+    if info.ranges and len(info.ranges) != len(network.backbone.convolutions()):
+        return f"{len(info.ranges)} ranges of integers for {len(network.backbone.convolutions())} convolutions"
     outputs = {spec.name: spec.outputs for spec in DISCRETE}
     counts = info.data.get("train_classes", {})
     if any(len(count) != outputs.get(name) or min(count) < 0 or not sum(count) for name, count in counts.items()):
         return "counts of other classes than this caldrive's"
     return ""
+
+
+def _is_constant(weight: Tensor) -> bool:
+    """Whether nothing depends on a weight's input: all of it is 0, or a matrix has one value throughout."""
+    if weight.dim() == 1 or weight.numel() == 1:
+        return not bool(weight.any())
+    return bool(weight.max() - weight.min() < SMALLEST_SPREAD)
