@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
 
@@ -33,15 +34,32 @@ def readable_width() -> Iterator[None]:
                 os.environ[name] = value
 
 
+LINES_EVERY = 10.0  # s
+
+
 def silent(label: str, share: float) -> None:
     """Progress that nobody follows."""
 
 
+def progress_lines(clock: Callable[[], float] = time.monotonic) -> Progress:
+    """Progress as a line on stderr now and then, as logs want it; work that takes a moment says nothing. clock: s."""
+    last = clock()
+
+    def say(label: str, share: float) -> None:
+        nonlocal last
+        if clock() - last >= LINES_EVERY:
+            last = clock()
+            with suppress(OSError, ValueError):  # nobody may listen any more
+                print(f"{label} ({share:.0%})", file=sys.stderr, flush=True)
+
+    return say
+
+
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar on stderr, where people sit before it."""
+    """A bar on stderr where people sit before it, lines elsewhere."""
     if sys.stderr is None or not sys.stderr.isatty():
-        yield silent
+        yield silent if sys.stderr is None else progress_lines()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn

@@ -31,7 +31,7 @@ SHORT = TrainingConfig(
     steps=6, batch=4, window=3, warm_up=2, history_steps=0, evaluate_every=100, save_every=2, precision="fp32",
     validation_share=0.3,
 )  # fmt: skip
-HISTORY = replace(SHORT, history_steps=5, history_batch=8)  # with a second stage
+HISTORY = replace(SHORT, steps=11, history_steps=5, history_batch=8)  # with a second stage
 
 
 def column_image(center_distance: float, red: bool = False) -> Image:

@@ -80,7 +80,7 @@ class Report(Output):
         from caldrive.benchmark.report.page import report_page, report_text
         from caldrive.benchmark.report.runs import failures, load_runs
         from caldrive.checks import require_writable_folder
-        from caldrive.files import write_whole
+        from caldrive.files import locked_folder, write_whole
 
         if not self.folders:
             raise ValueError("found no folder, wanted a benchmark's: type caldrive report out/benchmark")
@@ -88,7 +88,8 @@ class Report(Output):
         require_writable_folder(self.out)
         progress("writing", 0.2)
         text, page = report_text(runs), report_page(runs)
-        write_whole(self.out / "report.md", text.encode())
-        write_whole(self.out / "report.html", page.encode())
+        with locked_folder(self.out):
+            write_whole(self.out / "report.md", text.encode())
+            write_whole(self.out / "report.html", page.encode())
         values = {"out": str(self.out), "runs": [run.name for run in runs], "failures": len(failures(runs))}
         return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")

@@ -83,11 +83,11 @@ class Evaluate(Output):
         if self.worst is not None:
             require_writable_file(self.worst, "--worst", ".png")
         network, info = load_network(model_path(self.model))
-        precision = driving_precision(self.precision, info)
+        precision = driving_precision(self.precision, info.ranges)
         episodes = find_episodes(self.data)
         if self.held_out:
             episodes = held_out(episodes, info.data.get("validation_episodes", []))
         frames = Frames(episodes, network.config.image_size)
-        evaluation = report(network, frames, backbone_engine(precision, network, info), self.worst, progress)
+        evaluation = report(network, frames, backbone_engine(precision, network, info.ranges), self.worst, progress)
         values = asdict(evaluation) | {"paper": published_metrics(), "precision": precision}
         return Answer(values, evaluation_table(evaluation, precision))

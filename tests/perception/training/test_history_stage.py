@@ -28,8 +28,10 @@ from tests.perception.data import HEIGHT, HISTORY, SHORT, TINY, WIDTH
 
 
 def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path: Path) -> None:
-    long = replace(HISTORY, history_steps=60, learning_rate=3e-3, augmentation=AugmentationConfig(enabled=False))
-    before = load_network(train(replace(long, history_steps=0), folder, tmp_path / "before", TINY))[0]
+    long = replace(
+        HISTORY, steps=66, history_steps=60, learning_rate=3e-3, augmentation=AugmentationConfig(enabled=False)
+    )
+    before = load_network(train(replace(long, steps=6, history_steps=0), folder, tmp_path / "before", TINY))[0]
     after, info = load_network(train(long, folder, tmp_path / "after", TINY))
     rows = [json.loads(line) for line in (tmp_path / "after" / "metrics.jsonl").read_text().splitlines()]
     assert [row["step"] for row in rows] == list(range(1, 67))
@@ -40,8 +42,8 @@ def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path
 
 
 def test_only_temporal_blocks_change(folder: Path, tmp_path: Path) -> None:
-    first = train(HISTORY, folder, tmp_path, TINY, stop=lambda step: step == 6)
-    before = load_network(first)[0].state_dict()
+    train(HISTORY, folder, tmp_path, TINY, stop=lambda step: step == 6)
+    before = load_network(tmp_path / "unfinished.safetensors")[0].state_dict()
     after = load_network(train(HISTORY, folder, tmp_path, TINY))[0].state_dict()
     changed = {name for name in before if not torch.equal(before[name], after[name])}
     temporal = tuple(f"blocks.{spec.name}." for spec in SPECS if getattr(TINY, spec.name).temporal)
@@ -57,8 +59,8 @@ def test_without_a_temporal_block_there_is_no_second_stage(folder: Path, tmp_pat
 
 
 def test_until_the_second_stage_blocks_see_no_history(folder: Path, tmp_path: Path) -> None:
-    model = train(HISTORY, folder, tmp_path, TINY, stop=lambda step: step == 6)
-    network, info = load_network(model)
+    train(HISTORY, folder, tmp_path, TINY, stop=lambda step: step == 6)
+    network, info = load_network(tmp_path / "unfinished.safetensors")
     held = Frames(split(find_episodes(folder), HISTORY.validation_share, HISTORY.seed)[1], (HEIGHT, WIDTH))
     assert evaluate(network, held, "fp32", context=0) == info.metrics
     assert evaluate(network, held, "fp32") != info.metrics
@@ -127,7 +129,7 @@ def test_a_kill_after_the_last_step_leaves_no_features(folder: Path, tmp_path: P
 def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: Path) -> None:
     network, info = load_network(train(SHORT, folder, tmp_path, TINY))
     frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
-    features = history_stage._features(frames, np.arange(len(frames)), backbone_engine("fp32", network, info))
+    features = history_stage._features(frames, np.arange(len(frames)), backbone_engine("fp32", network, info.ranges))
     with torch.no_grad():
         expected = network.features(normalise(to_float(frames.images(np.arange(3)))))
     assert features.dtype == torch.float16

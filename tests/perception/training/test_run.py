@@ -11,7 +11,7 @@ from caldrive.perception.training.run import gradient_step, learning_rate
 
 def test_the_rate_warms_up_and_falls() -> None:
     config = TrainingConfig(steps=100, warm_up=10, learning_rate=1.0, final_rate=0.1)
-    rates = [learning_rate(step, config) for step in range(100)]
+    rates = [learning_rate(step, config.steps, config) for step in range(100)]
     assert rates[0] == pytest.approx(0.1)
     assert max(rates) == rates[10] == 1.0
     assert rates[99] == pytest.approx(0.1, abs=0.01)

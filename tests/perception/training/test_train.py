@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from caldrive.files import locked_folder
 from caldrive.perception.dataset.config import AugmentationConfig
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import evaluate
-from caldrive.perception.network.checkpoint import load_network, read_tensors
+from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_tensors
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
-from caldrive.perception.training.train import train
+from caldrive.perception.training.train import _read_frames, train
 from caldrive.recordings.folder import find_episodes, split
+from caldrive.recordings.writer import EpisodeError
 from tests.perception.data import HEIGHT, HISTORY, SHORT, TINY, WIDTH, record
 
 
@@ -77,5 +79,50 @@ def test_a_network_that_was_removed_and_whose_blocks_were_killed_comes_again(fol
     model.unlink()
     with pytest.raises(KeyboardInterrupt):
         train(HISTORY, folder, tmp_path, TINY, progress=kill)
-    assert model.read_bytes() != whole
+    assert not model.exists()
     assert train(HISTORY, folder, tmp_path, TINY).read_bytes() == whole
+
+
+def test_only_frames_that_train_carry_semantic_images(tmp_path: Path) -> None:
+    training, validation = _read_frames(SHORT, TINY, record(tmp_path, n_frames=5, semantic=True))
+    assert training.has_semantics
+    assert not validation.has_semantics
+
+
+@pytest.mark.parametrize("config", [SHORT, HISTORY], ids=["one stage", "two stages"])
+def test_a_network_carries_its_name_when_it_is_finished_and_not_before(
+    config: TrainingConfig, folder: Path, tmp_path: Path
+) -> None:
+    often = replace(config, evaluate_every=1)
+    model = train(often, folder, tmp_path, TINY, stop=lambda step: step == 3)
+    assert not model.exists()
+    load_network(tmp_path / "unfinished.safetensors")
+    with pytest.raises(
+        CheckpointError, match=r"a training in .* that is not finished, .* type caldrive train as before"
+    ):
+        load_network(model)
+    train(often, folder, tmp_path, TINY)
+    load_network(model)
+    assert not (tmp_path / "unfinished.safetensors").exists()
+
+
+def test_a_training_has_as_many_steps_as_were_asked_for(folder: Path, tmp_path: Path) -> None:
+    said = []
+    config = TrainingConfig(steps=6, batch=4, history_batch=4, precision="fp32", validation_share=0.3)
+    train(config, folder, tmp_path, TINY, progress=lambda label, share: said.append((label, share)))
+    assert len((tmp_path / "metrics.jsonl").read_text().splitlines()) == 6
+    assert (config.second_stage, TRAININGS["small"].second_stage, TRAININGS["paper"].second_stage) == (1, 3000, 0)
+    assert said[-1][0].startswith("training, step 6 of 6, loss ")
+    assert said[-1][1] == 1.0
+
+
+def test_two_trainings_in_one_folder_at_once_are_refused(folder: Path, tmp_path: Path) -> None:
+    with locked_folder(tmp_path), pytest.raises(ValueError, match="found another process at work"):
+        train(SHORT, folder, tmp_path, TINY)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_an_episode_no_folder_is_made(tmp_path: Path) -> None:
+    with pytest.raises(EpisodeError, match="caldrive collect"):
+        train(SHORT, tmp_path / "none", tmp_path / "out", TINY)
+    assert list(tmp_path.iterdir()) == []

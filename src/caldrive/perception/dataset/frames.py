@@ -65,7 +65,7 @@ class Frames:
         self.alternative_targets = {s.name: encode(s, self.column(f"other_{s.name}")) for s in CONDITIONAL}
         self.episode, self.time_step = self.by_episode(range(len(episodes))), self.column("frame")
         self.stream_start = self._stream_starts()
-        self._sources = [(episode, row) for episode in episodes for row in range(len(episode))]
+        self._first_row = np.concatenate(([0], np.cumsum([len(episode) for episode in episodes])))  # of each episode
         self.has_semantics = all(episode.semantics is not None for episode in episodes)
         self._pool = ThreadPoolExecutor(2)
         self._cache: NDArray[np.uint8] | None = None
@@ -73,7 +73,7 @@ class Frames:
             self._cache = self.images(np.arange(len(self)))
 
     def __len__(self) -> int:
-        return len(self._sources)
+        return len(self.episode)
 
     @cached_property
     def digest(self) -> str:
@@ -104,7 +104,8 @@ class Frames:
 
     def source(self, i: int) -> tuple[Episode, int]:
         """The episode and the row that frame i comes from."""
-        return self._sources[i]
+        number = self.episode[i]
+        return self.episodes[number], int(i - self._first_row[number])
 
     def images(self, ids: Ids) -> NDArray[np.uint8]:
         """Images (N, H, W, 3) of frames by number."""
@@ -116,7 +117,7 @@ class Frames:
         return images
 
     def _decode(self, i: int) -> NDArray[np.uint8]:
-        episode, row = self._sources[i]
+        episode, row = self.source(i)
         image = episode.image(row)
         if image.shape[:2] != self.size:
             recorded, wanted = (f"{w} x {h}" for h, w in (image.shape[:2], self.size))
@@ -129,15 +130,14 @@ class Frames:
         """Semantic images (N, H, W) of frames by number, where all episodes have them."""
         if not self.has_semantics:
             return None
-        sources = (self._sources[i] for i in ids.tolist())
+        sources = map(self.source, ids.tolist())
         return np.stack(list(self._pool.map(lambda source: source[0].semantic(source[1], self.size), sources)))
 
     def window_starts(self, window: int) -> Ids:
         """All frames that begin a window."""
-        last = np.arange(len(self)) + window - 1
-        inside = last < len(self)
-        inside[inside] &= self.stream_start[last[inside]] == self.stream_start[: len(self)][inside]
-        return np.flatnonzero(inside)
+        starts = np.arange(len(self) - window + 1)
+        within: Ids = starts[self.stream_start[starts] == self.stream_start[starts + window - 1]]
+        return within
 
     def windows(self, starts: Ids, window: int, context: int) -> Ids:
         """Frames (B, context + window) of the windows whose first frames with a loss are `starts`; before a stream's

@@ -69,7 +69,7 @@ class Sampler:
         size."""
         share = np.zeros(len(self.frames))
         for i in range(self.window):
-            np.add.at(share, self.starts + i, self.probability / self.window)
+            share[self.starts + i] += self.probability / self.window  # each frame once
         samples = share * len(self.frames)
         return {
             spec.name: np.bincount(self.frames.targets[spec.name].numpy(), samples, spec.outputs).astype(float)

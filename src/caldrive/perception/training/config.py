@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from caldrive.checks import MOST_SEED, Limits, require_limits
+from caldrive.checks import MOST_SEED, Limits, require_limits, require_within
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
 
 
@@ -31,6 +31,8 @@ class LossWeights:
     """Weight of the auxiliary segmentation's loss, where the recording has semantic images; 0 leaves it out."""
 
 
+HISTORY_SHARE = 3 / 14  # of the steps, in which the temporal blocks learn alone
+
 # What each number may be, from and to; a setting that is not here may be any number.
 LIMITS: Limits = {
     "steps": (1, 10_000_000),
@@ -42,7 +44,6 @@ LIMITS: Limits = {
     "clip": (1e-9, 1e9),
     "balance": (0.0, 1.0),
     "alternative_share": (0.0, 1.0),
-    "history_steps": (0, 10_000_000),
     "history_batch": (1, 100_000),
     "backbone_chunk": (0, 1_000_000),
     "validation_share": (0.0, 1.0),
@@ -56,8 +57,8 @@ LIMITS: Limits = {
 class TrainingConfig:
     """How the network learns: Adam with a warm-up and a cosine, then a second stage for the temporal blocks alone."""
 
-    steps: int = 11_000
-    """Steps of the whole network; those of its temporal blocks alone follow."""
+    steps: int = 14_000
+    """Steps in all: of the whole network, and then of its temporal blocks alone."""
     batch: int = 64
     """Windows a step."""
     window: int = 1
@@ -80,9 +81,10 @@ class TrainingConfig:
     """Other colours, light, blur and noise for whole images."""
     recolour: RecolourConfig = RecolourConfig()
     """Other colours for each class of things, where the recording has semantic images."""
-    history_steps: int = 3_000
-    """Steps of the second stage, in which the temporal blocks learn alone from what the finished backbone makes of the
-    frames. Until then a window is seen as if its stream began there. 0: they see their history from the first step."""
+    history_steps: int | None = None
+    """Of all steps the last ones, in which the temporal blocks learn alone from what the finished backbone makes of the
+    frames; without it three of fourteen. Until then a window is seen as if its stream began there. 0: they see their
+    history from the first step."""
     history_batch: int = 256
     """Windows with their history in a step of the second stage."""
     backbone_chunk: int = 0
@@ -110,8 +112,14 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         require_limits(vars(self), LIMITS, vars(TrainingConfig))
+        require_within("--history-steps", self.second_stage, 0, self.steps - 1, 0)
         if self.initial and self.imagenet not in ("none", "cache"):
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
+
+    @property
+    def second_stage(self) -> int:
+        """Steps of the temporal blocks alone, where there are such blocks."""
+        return round(HISTORY_SHARE * self.steps) if self.history_steps is None else self.history_steps
 
 
 TRAININGS = {

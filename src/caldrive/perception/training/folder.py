@@ -13,21 +13,22 @@ import numpy as np
 
 from caldrive.affordances import SPECS
 from caldrive.files import read_json, write_figure, write_whole
-from caldrive.perception.network.checkpoint import CheckpointError
+from caldrive.perception.network.checkpoint import UNFINISHED, CheckpointError
 
 Row = dict[str, int | float]  # a step's metrics
 SMOOTHED_STEPS = 50  # that the loss is averaged over in its curve
 
 
 class TrainingFolder:
-    """The folder of a run: state.safetensors, from which it goes on, model.safetensors, metrics.jsonl with a row a
-    step, curves.png, and what only lies there for a time.
+    """The folder of a run: state.safetensors, from which it goes on, model.safetensors once it is finished and
+    unfinished.safetensors until then, metrics.jsonl with a row a step, curves.png, and what only lies there for a time.
 
     rows: the metrics so far. Only the main one of several processes writes metrics.
     """
 
     def __init__(self, path: Path, is_main: bool = True) -> None:
         self.state, self.model = path / "state.safetensors", path / "model.safetensors"
+        self.unfinished = path / UNFINISHED
         self.metrics, self.curves = path / "metrics.jsonl", path / "curves.png"
         self.features, self._tensorboard = path / "features", path / "tensorboard"
         self.rows: list[Row] = []
@@ -78,13 +79,15 @@ class TrainingFolder:
         """Writes all rows so far."""
         write_whole(self.metrics, "".join(json.dumps(row) + "\n" for row in self.rows).encode())
 
-    def draw_curves(self) -> None:
-        """Draws all rows so far."""
-        draw_curves(self.rows, self.curves)
+    def has_finished(self, step: int) -> bool:
+        """Whether the run's network is there, and its metrics up to its last step."""
+        is_whole = self.model.is_file() and not self.unfinished.is_file()
+        return is_whole and any(row["step"] == step for row in self.saved_rows(step))
 
-    def remove_features(self) -> None:
-        """Frees the disk of the features that the second stage learns from."""
+    def remove_unfinished(self) -> None:
+        """Frees the disk of what only an unfinished run needs."""
         shutil.rmtree(self.features, ignore_errors=True)
+        self.unfinished.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Writes what TensorBoard has not been given yet."""

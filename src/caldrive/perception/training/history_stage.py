@@ -11,7 +11,6 @@ from __future__ import annotations
 import copy
 import hashlib
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,6 @@ from caldrive.perception.inference.engines import BackboneEngine, backbone_engin
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.checkpoint import (
     CheckpointError,
-    CheckpointInfo,
     read_tensors,
     round_to_half,
     write_tensors,
@@ -37,14 +35,14 @@ from caldrive.progress import Progress
 FRAMES_A_FILE, FRAMES_A_PASS = 8192, 64
 
 
-def feature_table(run: TrainingRun, info: CheckpointInfo, folder: Path, progress: Progress) -> Tensor:
+def feature_table(run: TrainingRun, ranges: tuple[float, ...], folder: Path, progress: Progress) -> Tensor:
     """The features of every frame (N, F) by the backbone, rounded as it is stored; kept in `folder`, so that it goes on
-    after a kill. info: of the network as it is stored."""
+    after a kill. ranges: those that are stored with the network."""
     network, frames = run.network.cpu().eval(), run.sampler.frames
     round_to_half(network)
-    precision = driving_precision("auto", info)
-    digest = _digest(network.backbone, precision, info.ranges, frames)
-    engine = backbone_engine(precision, copy.deepcopy(network), info)
+    precision = driving_precision("auto", ranges)
+    digest = _digest(network.backbone, precision, ranges, frames)
+    engine = backbone_engine(precision, copy.deepcopy(network), ranges)
     table = torch.empty(len(frames), network.backbone.n_features(*network.config.image_size)).half()
     for number, first in enumerate(range(0, len(frames), FRAMES_A_FILE)):
         path = folder / f"{number:04d}.safetensors"
@@ -84,18 +82,18 @@ def _saved_features(path: Path, digest: str) -> Tensor | None:
 
 def train_temporal_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
     """Trains the run's temporal blocks on features (N, F) of all its frames; yields each step's loss."""
-    config = replace(run.config, steps=run.config.history_steps)  # the rate begins again with its warm-up
+    config, steps = run.config, run.history_steps
     weights = {name: weight.cpu() for name, weight in run.class_weights.items()}
     blocks = nn.ModuleDict({name: block for name, block in run.network.task_blocks().items() if block.config.temporal})
     optimizer = Adam(blocks.parameters(), config.learning_rate)
     blocks.train()
-    for step in range(config.history_steps):
-        run_step = run.config.steps + step  # counted through both stages
+    for step in range(steps):
+        run_step = run.steps + step  # counted through both stages
         torch.manual_seed(config.seed * SEED_STRIDE + run_step)  # dropout
         history, command, targets = _history_batch(run, features, run_step)
         outputs = {name: block(history, command) for name, block in blocks.items()}
         loss = multitask_loss(outputs, targets, weights)
-        gradient_step(optimizer, loss, learning_rate(step, config), config.clip)
+        gradient_step(optimizer, loss, learning_rate(step, steps, config), config.clip)  # with a warm-up again
         yield float(loss.detach())
 
 

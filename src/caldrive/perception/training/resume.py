@@ -52,8 +52,8 @@ def restore_state(path: Path, run: TrainingRun) -> None:
         header = as_type(values, Header)
         if difference := _difference(run, tensors, header):
             raise CheckpointError(f"found in {path} a run {difference}")
-        if not 0 <= header["step"] <= run.config.steps:
-            raise ValueError(f"step {header['step']} of {run.config.steps}")
+        if not 0 <= header["step"] <= run.steps:
+            raise ValueError(f"step {header['step']} of {run.steps}")
         _restore(run, tensors, header)
     except CheckpointError:
         raise

@@ -34,11 +34,11 @@ from caldrive.perception.training.multitask import (
 SEED_STRIDE = 1_000_003  # more than the steps of a run, so that the steps of two runs have different seeds
 
 
-def learning_rate(step: int, config: TrainingConfig) -> float:
-    """Rate of a step: a straight warm-up, then a cosine down to final_rate of the base rate."""
+def learning_rate(step: int, steps: int, config: TrainingConfig) -> float:
+    """Rate of one of a stage's steps: a straight warm-up, then a cosine down to final_rate of the base rate."""
     if step < config.warm_up:
         return config.learning_rate * (step + 1) / config.warm_up
-    done = (step - config.warm_up) / max(1, config.steps - config.warm_up)
+    done = (step - config.warm_up) / max(1, steps - config.warm_up)
     share = config.final_rate + (1 - config.final_rate) * (1 + math.cos(math.pi * done)) / 2
     return config.learning_rate * share
 
@@ -79,7 +79,22 @@ class TrainingRun:
     @property
     def context(self) -> int:
         """Frames of history that a window brings along."""
-        return 0 if self.config.history_steps else self.network.span - 1
+        return 0 if self.history_steps else self.network.span - 1
+
+    @property
+    def history_steps(self) -> int:
+        """Steps of the second stage; none where no block looks back."""
+        return self.config.second_stage if self.network.span > 1 else 0
+
+    @property
+    def steps(self) -> int:
+        """Steps of the first stage, of the whole network."""
+        return self.config.steps - self.history_steps
+
+    @property
+    def rate(self) -> float:
+        """The learning rate of the step that is next."""
+        return learning_rate(self.step, self.steps, self.config)
 
     def advance(self) -> float:
         """One step; returns its loss, where there are several processes that of this one's share of the batch."""
@@ -87,7 +102,7 @@ class TrainingRun:
         generator = Generator().manual_seed(seed)
         torch.manual_seed(seed)  # dropout
         loss = self._loss(self._batch(), generator)
-        gradient_step(self.optimizer, loss, learning_rate(self.step, self.config), self.config.clip)
+        gradient_step(self.optimizer, loss, self.rate, self.config.clip)
         self.step += 1
         return float(loss.detach())
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable
-from contextlib import closing
-from dataclasses import asdict
+from contextlib import closing, nullcontext
+from dataclasses import asdict, replace
 from pathlib import Path
 
+from caldrive.files import locked_folder
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.dataset.sampler import data_summary
 from caldrive.perception.evaluation.evaluate import evaluate
@@ -18,13 +20,13 @@ from caldrive.perception.network.checkpoint import CheckpointInfo, read_info, ro
 from caldrive.perception.network.config import NetworkConfig
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.perception.training.distributed import join_process_group
-from caldrive.perception.training.folder import Row, TrainingFolder
+from caldrive.perception.training.folder import Row, TrainingFolder, draw_curves
 from caldrive.perception.training.history_stage import feature_table, train_temporal_blocks
 from caldrive.perception.training.initial import with_initial_weights, without_initial_weights
 from caldrive.perception.training.resume import restore_state, save_state
-from caldrive.perception.training.run import TrainingRun, learning_rate, start_run
+from caldrive.perception.training.run import TrainingRun, start_run
 from caldrive.progress import Progress, silent
-from caldrive.recordings.folder import find_episodes, split
+from caldrive.recordings.folder import episode_paths, find_episodes, split
 
 RANGE_FRAMES = 512  # on which the ranges of 8 bits are found
 
@@ -41,24 +43,27 @@ def train(
 
     In `out` lie also state.safetensors, from which the same call resumes, and metrics.jsonl: a row a step with its
     loss, and validation metrics every `evaluate_every` steps and at the end; curves.png draws them, and where
-    TensorBoard is installed it finds them in `out`/tensorboard. While the temporal blocks learn alone, `features` holds
-    what the finished backbone makes of the frames; before that the network has learnt to see without history, and its
-    metrics are those without. `stop` may end the run early after a step. Under torchrun the processes share each batch
-    out, and the first one writes. Raises ValueError for settings or data that cannot be.
+    TensorBoard is installed it finds them in `out`/tensorboard. Until the network is finished it is called
+    unfinished.safetensors. While the temporal blocks learn alone, `features` holds what the finished backbone makes of
+    the frames; before that the network has learnt to see without history, and its metrics are those without. `stop` may
+    end the run early after a step. Under torchrun the processes share each batch out, and the first one writes. Raises
+    ValueError for settings or data that cannot be, and where another process works in `out`.
     """
     network = network or NetworkConfig()
     group = join_process_group(config.device, config.batch)
     folder = TrainingFolder(Path(out), group.is_main)
     resumed = folder.has_state
     config = without_initial_weights(config) if resumed else with_initial_weights(config)
-    frames, validation = _read_frames(config, network, data)
-    run = start_run(config, network, frames, group)
-    if resumed:
-        restore_state(folder.state, run)
-    group.barrier()
-    folder.open_metrics(run.step)
-    with closing(folder):
-        _train_all(run, validation, folder, progress if group.is_main else silent, stop)
+    episode_paths(data)  # without one, no folder is made
+    with locked_folder(Path(out)) if group.is_main else nullcontext():
+        frames, validation = _read_frames(config, network, data)
+        run = start_run(config, network, frames, group)
+        if resumed:
+            restore_state(folder.state, run)
+        group.barrier()
+        folder.open_metrics(run.step)
+        with closing(folder):
+            _train_all(run, validation, folder, progress if group.is_main else silent, stop)
     return folder.model
 
 
@@ -66,6 +71,7 @@ def _read_frames(config: TrainingConfig, network: NetworkConfig, data: Path | st
     """The frames that train, and those that validate."""
     episodes = find_episodes(data, semantic=config.loss_weights.segmentation > 0 or config.recolour.enabled)
     training, validation = split(episodes, config.validation_share, config.seed)
+    validation = [replace(episode, semantics=None) for episode in validation]  # only a loss looks at them
     return Frames(training, network.image_size, config.cache_gb), Frames(validation, network.image_size)
 
 
@@ -73,52 +79,59 @@ def _train_all(
     run: TrainingRun, validation: Frames, folder: TrainingFolder, progress: Progress, stop: Callable[[int], bool]
 ) -> None:
     """The steps of the whole network, then those of its temporal blocks alone, unless somebody stops them."""
-    steps = run.config.steps
-    while run.step < steps and not stop(run.step):
+    while run.step < run.steps and not stop(run.step):
         _step(run, validation, folder)
-        progress(f"training, step {run.step}, loss {folder.rows[-1]['loss']:.3f}", run.step / steps)
-    if run.step == steps and run.group.is_main and not stop(run.step):
-        _train_history(run, validation, folder, progress)
+        _report(run, folder, progress)
+    if run.step == run.steps and run.group.is_main and not stop(run.step):
+        _finish(run, validation, folder, progress)
+
+
+def _report(run: TrainingRun, folder: TrainingFolder, progress: Progress) -> None:
+    """Says how far the run has come."""
+    row, steps = folder.rows[-1], run.config.steps
+    progress(f"training, step {row['step']} of {steps}, loss {row['loss']:.3f}", row["step"] / steps)
 
 
 def _step(run: TrainingRun, validation: Frames, folder: TrainingFolder) -> None:
     """One step of the whole network, and what belongs after it."""
     config, began = run.config, time.perf_counter()
-    row: Row = {"step": run.step + 1, "rate": learning_rate(run.step, config), "loss": _number(run.advance(), run.step)}
+    row: Row = {"step": run.step + 1, "rate": run.rate, "loss": _number(run.advance(), run.step)}
     row["windows_per_s"] = config.batch / (time.perf_counter() - began)
     folder.add(row)
-    last = run.step == config.steps
+    last = run.step == run.steps
     if last or run.step % config.evaluate_every == 0:
         if run.group.is_main:
-            folder.add_to_last(validate(run, validation, folder.model, run.context))
-            folder.draw_curves()
+            folder.add_to_last(validate(run, validation, folder.unfinished, run.context))
+            draw_curves(folder.rows, folder.curves)
         run.group.barrier()
     if run.group.is_main and (last or run.step % config.save_every == 0):
         folder.write_metrics()
         save_state(folder.state, run)
 
 
+def _finish(run: TrainingRun, validation: Frames, folder: TrainingFolder, progress: Progress) -> None:
+    """What makes a finished network of a whole one, unless it is there already. One that somebody removed comes
+    again."""
+    if not folder.has_finished(run.config.steps):
+        if not folder.unfinished.is_file():
+            validate(run, validation, folder.unfinished, run.context)
+        if run.history_steps:
+            _train_history(run, validation, folder, progress)
+        else:
+            os.replace(folder.unfinished, folder.model)
+    folder.remove_unfinished()
+
+
 def _train_history(run: TrainingRun, validation: Frames, folder: TrainingFolder, progress: Progress) -> None:
-    """The temporal blocks learn alone, unless they did already. A network that somebody removed comes again."""
-    steps, history_steps = run.config.steps, run.config.history_steps
-    last, has_model = steps + history_steps, folder.model.is_file()
-    if has_model and any(row["step"] == last for row in folder.saved_rows(last)):
-        folder.remove_features()
-        return
-    if not has_model:
-        folder.write_metrics()  # else those of the second stage would speak for a network that it has not trained yet
-        validate(run, validation, folder.model, run.context)
-    if not history_steps or run.network.span == 1:
-        return
-    features = feature_table(run, read_info(folder.model), folder.features, progress)
-    for step, loss in enumerate(train_temporal_blocks(run, features), start=1):
-        folder.add({"step": steps + step, "loss": _number(loss, steps + step)})
-        progress(f"blocks, step {step}, loss {loss:.3f}", step / history_steps)
+    """The temporal blocks learn alone."""
+    features = feature_table(run, read_info(folder.unfinished).ranges, folder.features, progress)
+    for step, loss in enumerate(train_temporal_blocks(run, features), start=run.steps + 1):
+        folder.add({"step": step, "loss": _number(loss, step)})
+        _report(run, folder, progress)
     run.network.to(run.group.device)
     folder.add_to_last(validate(run, validation, folder.model, run.network.span - 1))
-    folder.draw_curves()
+    draw_curves(folder.rows, folder.curves)
     folder.write_metrics()
-    folder.remove_features()
 
 
 def validate(run: TrainingRun, validation: Frames, model: Path, context: int) -> Row:
