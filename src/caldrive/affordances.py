@@ -1,6 +1,14 @@
 """The table of the affordances (Fig. 3): what each one is. Everything that lists affordances reads it.
 
-To add one: a field of `datatypes.Affordances`, a row here, and a function in `world/truth/labels.py` that labels it.
+To add one, give it the same name in each of these; then record and train again:
+
+* `datatypes.Affordances`: a field; `datatypes.Alternative`, too, where it depends on the command
+* `SPECS` here: a row
+* `world/truth/labels.py`: what labels it
+* `recordings/writer.py`: FORMAT_VERSION raised; `recordings/check.py`: bins of its histogram, where it is continuous
+* `perception/network/config.py`: its task block; `perception/training/config.py`: its weight in the loss
+* `visualization/gauges.py`: how it is drawn; `benchmark/report/runs.py`: from which error on it counts as wrong
+* `control/`: what it changes, if anything
 """
 
 from __future__ import annotations

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +14,7 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.driving.setup import set_up
 from caldrive.driving.tasks import task_scenarios
 from caldrive.interfaces import is_recordable
+from caldrive.perception.network.checkpoint import load_network, save_network
 
 
 def test_the_network_that_ships_is_small() -> None:
@@ -35,3 +39,10 @@ def test_the_network_that_ships_knows_how_far_aside_it_is_and_comes_back(aside: 
         assert np.mean(seen[:5]) == pytest.approx(max(-2.0, -aside), abs=0.3)
         assert abs(world.truth().affordances.center_distance) < 0.2
     world.close()
+
+
+def test_a_network_that_would_take_many_times_as_long_does_not_drive(tmp_path: Path) -> None:
+    network, info = load_network(SHIPPED_MODEL)
+    save_network(tmp_path / "slow.safetensors", network, replace(info, ranges=()), half=True)
+    with pytest.raises(ValueError, match=r"found no ranges for 8-bit integers in .*slow\.safetensors"):
+        set_up(AgentSettings(model=tmp_path / "slow.safetensors"))

@@ -144,12 +144,12 @@ def _figure(value: float | None, scale: float = 1.0) -> str:
 
 def _figures(figures: Mapping[str, float | None]) -> list[str]:
     """One cell for each affordance, in percent or in SI units."""
-    return [_figure(figures[spec.metric], 100 if spec.discrete else 1) for spec in SPECS]
+    return [_figure(figures.get(spec.metric), 100 if spec.discrete else 1) for spec in SPECS]
 
 
 def _scaled(figures: Mapping[str, float | None]) -> list[str]:
     """Errors of the continuous affordances in units of their scale, as the supplement prints them."""
-    return ["" if spec.discrete else _figure(figures[spec.metric], 1 / spec.scale) for spec in SPECS]
+    return ["" if spec.discrete else _figure(figures.get(spec.metric), 1 / spec.scale) for spec in SPECS]
 
 
 def evaluation_table(report: Report, precision: str) -> Group:

@@ -83,6 +83,7 @@ def test_weights_of_another_network_are_refused(network: Network, tmp_path: Path
 HEADERS: list[dict[str, Any]] = [
     {"config": asdict(TINY) | {"wings": 2}}, {"config": {"red_light": {"wings": 2}}}, {"metrics": {"loss": "low"}},
     {"seed": None}, {"ranges": 3}, {"config": asdict(TINY) | {"width": 1e30}}, {"config": {"image_width": 0}},
+    {"config": asdict(TINY) | {"image_height": 31}},
     {"config": {"red_light": {"length": 0}}}, {"config": {"red_light": {"dilation": -1}}},
     {"data": {"train_classes": 3}}, {"data": {"validation_episodes": 3}}, {"data": {"wings": 2}},
 ]  # fmt: skip

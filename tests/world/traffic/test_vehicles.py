@@ -251,3 +251,9 @@ def test_nobody_brakes_for_people_on_the_sidewalk(town02: RoadNetwork, usual: li
 def test_stuck_cars_are_moved_only_where_the_ego_does_not_look(ahead: float, left: float, seen: bool) -> None:
     ego = VehicleState(Pose(5, 5, math.pi / 2), id="ego")
     assert in_sight(ego, (5 - left, 5 + ahead)) is seen
+
+
+def test_more_cars_than_fit_are_refused_before_anything_grows_with_their_number(town02: RoadNetwork) -> None:
+    lights = TrafficLights(town02, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="found 1000000000000 cars asked for, but town02 has room for"):
+        Traffic(town02, n=10**12, seed=0, dt=DT, ego=AWAY, lights=lights)

@@ -39,7 +39,8 @@ YAW_EDGES = (5.0, 10.0)  # degrees; a car looks straight ahead, cameras of a rec
 
 def published_metrics() -> dict[str, float]:
     """The paper's figures as it prints them, by the names that `metrics` gives them."""
-    return {spec.metric if spec.discrete else f"{spec.metric}_scaled": PUBLISHED[spec.name] for spec in SPECS}
+    specs = (BY_NAME[name] for name in PUBLISHED)
+    return {spec.metric if spec.discrete else f"{spec.metric}_scaled": PUBLISHED[spec.name] for spec in specs}
 
 
 def published_figures() -> dict[str, float]:

@@ -24,6 +24,7 @@ from caldrive.perception.network.network import Network
 FORMAT_VERSION = 2
 KEY = "caldrive"  # of the JSON in safetensors' metadata
 UNFINISHED = "unfinished.safetensors"  # a network in the folder of a training that goes on
+FLOATS = ("F64", "F32", "F16", "BF16")  # safetensors' names
 SMALLEST_SPREAD = 1e-12  # of the values of a matrix of weights; the smallest that 16 bits tell apart is 6e-8
 
 
@@ -167,14 +168,14 @@ def _single(value: Tensor) -> Tensor:
 
 
 def _require_shapes(path: Path, config: NetworkConfig) -> None:
-    """Raises CheckpointError where a file's tensors are not those of its settings. Nothing is allocated: settings may
-    ask for more than there is memory."""
+    """Raises CheckpointError where a file's tensors have not the shapes and kinds of its settings. Nothing is allocated:
+    settings may ask for more than there is memory."""
     with torch.device("meta"):
-        wanted = {name: list(value.shape) for name, value in Network(config).state_dict().items()}
+        state = Network(config).state_dict()
     with safe_open(path, "pt") as file:
-        names = file.keys()
-        found = {name: file.get_slice(name).get_shape() for name in names}
-    if found != wanted:
+        slices = {name: file.get_slice(name) for name in file.keys()}  # noqa: SIM118 (it is no dictionary)
+        found = {name: (part.get_shape(), part.get_dtype() in FLOATS) for name, part in slices.items()}
+    if found != {name: (list(value.shape), value.is_floating_point()) for name, value in state.items()}:
         raise CheckpointError(
             f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
         )

@@ -13,6 +13,7 @@ from caldrive.checks import MOST_PIXELS
 Layer = Literal["dense", "lstm", "gru", "tconv"]
 Norm = Literal["batch", "layer", "none"]
 
+CELL = 32  # pixels a side that the backbone makes one place of; of a smaller image nothing is left
 MOST_FRAMES, MOST_NODES, MOST_WIDTH = 1000, 10_000, 10.0  # more than anyone builds
 
 
@@ -85,10 +86,10 @@ class NetworkConfig:
 
     def __post_init__(self) -> None:
         sides = self.image_width, self.image_height
-        if not 0 < self.width <= MOST_WIDTH or not all(1 <= side <= MOST_PIXELS for side in sides):
+        if not 0 < self.width <= MOST_WIDTH or not all(CELL <= side <= MOST_PIXELS for side in sides):
             raise ValueError(
                 f"found a network of width {self.width} for images of {sides[0]} x {sides[1]} pixels, wanted a width "
-                f"of more than 0 and at most {MOST_WIDTH:g}, and 1 to {MOST_PIXELS} pixels a side"
+                f"of more than 0 and at most {MOST_WIDTH:g}, and {CELL} to {MOST_PIXELS} pixels a side"
             )
 
     @property
