@@ -26,8 +26,7 @@ from caldrive.recordings.folder import Manifest, read_manifest
 from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, episode_path
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
-from caldrive.world.traffic import sidewalks
-from caldrive.world.traffic import vehicles as traffic
+from caldrive.world.traffic import sidewalks, start_places
 
 LIMITS: Limits = {  # of the options that are numbers
     "episodes": (1, 100_000), "duration": (0.1, 3600.0), "width": (16, MOST_PIXELS), "height": (16, MOST_PIXELS),
@@ -87,7 +86,7 @@ def _check(config: CollectConfig, workers: int) -> None:
     for number in config.weathers:
         weather(number)
     roads = load_roads(config.town)
-    room = {"cars": (0, traffic.room(roads)), "people": (0, sidewalks.room(roads))}
+    room = {"cars": (0, start_places.room(roads)), "people": (0, sidewalks.room(roads))}
     require_limits(values, room, {name: min(most, usual[name]) for name, (_, most) in room.items()})
 
 

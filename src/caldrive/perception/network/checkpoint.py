@@ -168,8 +168,8 @@ def _single(value: Tensor) -> Tensor:
 
 
 def _require_shapes(path: Path, config: NetworkConfig) -> None:
-    """Raises CheckpointError where a file's tensors have not the shapes and kinds of its settings. Nothing is allocated:
-    settings may ask for more than there is memory."""
+    """Raises CheckpointError where a file's tensors have not the shapes and kinds of its settings. Nothing is
+    allocated: settings may ask for more than there is memory."""
     with torch.device("meta"):
         state = Network(config).state_dict()
     with safe_open(path, "pt") as file:
