@@ -12,8 +12,8 @@ import pytest
 
 from caldrive.datatypes import Command, Pose
 from caldrive.geometry import Polyline, moved, wrap_angle
-from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.roads.route import COMMAND_AHEAD, Route, plan_route, random_route
+from caldrive.world.roads.network import Lane, RoadNetwork
+from caldrive.world.roads.route import COMMAND_AHEAD, Route, follow_lanes, plan_route, random_route
 
 SIDES = {Command.LEFT: 1, Command.RIGHT: -1, Command.STRAIGHT: 0}
 
@@ -189,3 +189,10 @@ def test_a_goal_on_a_lane_that_joins_nothing_cannot_be_reached(town01: RoadNetwo
     roads = replace(town01, lanes=town01.lanes | {island.id: island})
     with pytest.raises(ValueError, match=r"found no way from .* to \(-850, -900\)"):
         plan_route(roads, start.line.pose_at(5.0), line.pose_at(50.0))
+
+
+def test_a_way_too_short_to_follow_is_refused_in_a_sentence(town02: RoadNetwork) -> None:
+    stub = Lane("stub_0", Polyline(np.array([(0.0, 0.0), (0.01, 0.0)])), width=4.0, limit=50.0)
+    roads = replace(town02, lanes={"stub_0": stub})
+    with pytest.raises(ValueError, match=r"found a way of 0\.01 m in town02 .*wanted a longer one"):
+        follow_lanes(roads, ["stub_0"], 0.0, 0.01)

@@ -104,7 +104,8 @@ def _thinned(points: Points) -> Points:
 
 
 def follow_lanes(roads: RoadNetwork, ids: list[str], start: float, end: float) -> Route:
-    """The route along connected lanes from `start` m on the first to `end` m on the last."""
+    """The route along connected lanes from `start` m on the first to `end` m on the last. Raises ValueError where they
+    are all but one place."""
     path = [roads.lanes[id] for id in ids]
     first = path[0]
     length = sum(lane.line.length for lane in path[:-1]) - start + end
@@ -118,8 +119,13 @@ def follow_lanes(roads: RoadNetwork, ids: list[str], start: float, end: float) -
     begins = np.cumsum([-start] + [lane.line.length for lane in path[:-1]])
     lanes = [(lane.id, float(s)) for lane, s in zip(path, begins, strict=True)]
     inside = [turn for turn in _turns(roads, lanes) if turn.start < length]
-    line = Polyline(_thinned(np.concatenate([*points])))
-    return Route(line, length, turns=tuple(inside), lanes=tuple(lanes))
+    line = _thinned(np.concatenate([*points]))
+    if len(line) < 2:
+        raise ValueError(
+            f"found a way of {length:.2f} m in {roads.name} where the road ends, wanted a longer one: "
+            "give a start and a goal farther apart, or another map"
+        )
+    return Route(Polyline(line), length, turns=tuple(inside), lanes=tuple(lanes))
 
 
 def plan_route(roads: RoadNetwork, start: Pose, goal: Pose) -> Route:

@@ -30,5 +30,5 @@ def parse_xml(content: bytes) -> ET.Element:
     """The root of an XML document. Raises ValueError with the reason where it is none, or a dangerous one."""
     try:
         return ET.fromstring(content, parser=ET.XMLParser(target=_Builder()))
-    except (ET.ParseError, LookupError) as error:  # LookupError: an unknown encoding
+    except (ET.ParseError, LookupError) as error:  # of an unknown encoding
         raise ValueError(f"it is no XML: {error}") from error

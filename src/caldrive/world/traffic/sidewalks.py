@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -70,8 +69,9 @@ def find_sidewalks(roads: RoadNetwork) -> Sidewalks:
     loops = [ring.simplify(0.02) for ring in rings(middle)]
     tables = [_table(Polyline(shapely.get_coordinates(ring))) for ring in loops]
     shapely.prepare(middle)
+    tree = shapely.STRtree(loops)
     return Sidewalks(
-        crossings=tuple(_crossings(loop, table, loops, middle) for loop, table in enumerate(tables)),
+        crossings=tuple(_crossings(loop, table, tree, middle) for loop, table in enumerate(tables)),
         lengths=np.array([ring.length for ring in loops]),
         table=np.concatenate(tables),
         first=np.cumsum([0, *(len(table) for table in tables[:-1])]),
@@ -85,11 +85,9 @@ def _table(ring: Polyline) -> Floats:
     return np.column_stack((ring.points_at(at), np.interp(at, middles, np.unwrap(ring.headings))))
 
 
-def _crossings(
-    loop: int, table: Floats, loops: Sequence[shapely.LinearRing], middle: shapely.Geometry
-) -> tuple[Crossing, ...]:
+def _crossings(loop: int, table: Floats, tree: shapely.STRtree, middle: shapely.Geometry) -> tuple[Crossing, ...]:
     """Straight over the road every CROSSING_SPACING metres of a loop: towards the inside of the road area, up to the
-    next loop."""
+    next loop. tree: of all loops."""
     rows = np.arange(int(1.0 / GRAIN), len(table) - int(1.0 / GRAIN), int(CROSSING_SPACING / GRAIN))
     here, heading = table[rows, :2], table[rows, 2]
     sideways = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
@@ -100,7 +98,8 @@ def _crossings(
     last = np.argmin(inside, axis=1) - 1  # the first place beyond the far loop, and one back
     usable = ~inside.all(1) & (reach[last] > SHORTEST_CROSSING)
     ends = shapely.points(beams[np.arange(len(last)), last][usable])
-    end_loops = np.argmin([shapely.distance(ring, ends) for ring in loops], axis=0)
+    end_loops = tree.nearest(ends)
+    loops = tree.geometries
     end_s = [loops[k].project(end) for k, end in zip(end_loops, ends, strict=True)]
     places = [loops[k].interpolate(s).coords[0] for k, s in zip(end_loops, end_s, strict=True)]
     return tuple(
