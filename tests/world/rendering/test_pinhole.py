@@ -25,7 +25,8 @@ def test_a_camera_sees_what_lies_in_its_angle() -> None:
 @pytest.mark.parametrize(
     ("config", "message"),
     [
-        (CameraConfig(width=60_000), "found a camera of 60000 x 88 pixels, wanted 1 to 4096"),
+        (CameraConfig(width=60_000), "found a camera of 60000 x 88 pixels, wanted whole numbers from 1 to 4096"),
+        (CameraConfig(width=200.5), "found a camera of 200.5 x 88 pixels"),  # type: ignore[arg-type]
         (CameraConfig(height=0), "found a camera of 200 x 0 pixels"),
         (CameraConfig(fov=0.0), "found a camera that sees 0°"),
         (CameraConfig(fov=float("nan")), "found a camera that sees nan°"),

@@ -56,10 +56,10 @@ class PinholeCamera:
 
     def __post_init__(self) -> None:
         """Raises ValueError for a picture that no camera takes, before room is made for it."""
-        if not all(1 <= side <= MOST_PIXELS for side in self.size):
+        if not all(isinstance(side, int | np.integer) and 1 <= side <= MOST_PIXELS for side in self.size):
             raise ValueError(
-                f"found a camera of {self.size[0]} x {self.size[1]} pixels, wanted 1 to {MOST_PIXELS} on each side: "
-                "give CameraConfig(width=200, height=88)"
+                f"found a camera of {self.size[0]!r} x {self.size[1]!r} pixels, wanted whole numbers from 1 "
+                f"to {MOST_PIXELS} on each side: give CameraConfig(width=200, height=88)"
             )
         if not 0 < self.fov < 180:
             raise ValueError(f"found a camera that sees {self.fov:g}°, wanted 1° to 179°: give CameraConfig(fov=90.0)")
