@@ -34,6 +34,7 @@ from pathlib import Path
 from caldrive.checks import require_within
 from caldrive.config import from_toml
 from caldrive.control.controller import CALController, ControlConfig
+from caldrive.control.limits import require_constants
 from caldrive.control.longitudinal import LongitudinalConfig
 from caldrive.control.patience import PatienceConfig
 from caldrive.control.pid import PIDGains
@@ -78,6 +79,7 @@ def controller_config(name: str, cap: float | None) -> ControlConfig:
     if cap is not None:
         require_within("--cap", cap, 1.0, 200.0, 20)
     config = PRESETS[name] if name in PRESETS else from_toml(Path(name), PRESETS, DEFAULT)
+    require_constants(config, name)
     return replace(config, cap=cap) if cap is not None else config
 
 
