@@ -1,8 +1,11 @@
-"""Kills a benchmark with SIGKILL at random moments, lets it go on each time, and compares it with an unbroken run.
+"""Stops collect, train, benchmark and report again and again, lets them go on, and compares all files with an unbroken
+run's.
 
-    python scripts/kill_and_resume.py [--kills 20] [--seed 0] [--out out/kills] [arguments of caldrive benchmark]
+    python -m scripts.kill_and_resume [--kills 50] [--verbs collect train] [--seed 0] [--out out/kills]
 
-Ends with exit code 0 where both runs hold the same lines and print the same tables.
+A run is stopped in one of three ways, in turn: by SIGKILL at a random moment; by SIGKILL between two calls with which
+files are written; and by a disk that is full (a small one of its own where this user may mount one; else files may only
+grow to a random size). Ends with 0 where all files are the same and every full disk was named in one sentence.
 """
 
 from __future__ import annotations
@@ -10,44 +13,237 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import re
+import shutil
 import signal
-import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from scripts.attack.attempt import fresh, tree
+from scripts.attack.good import written_by_hand
+from scripts.attack.runner import Limits, confine, load_the_program
+from scripts.small_disk import SmallDisk
 
-def start(out: Path, arguments: list[str]) -> subprocess.Popen[bytes]:
-    """A benchmark in a process group of its own, so that its workers die with it."""
-    command = [sys.executable, "-m", "caldrive", "benchmark", "--out", str(out), *arguments]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
-
-
-def lines(out: Path) -> list[bytes]:
-    path = out / "results.jsonl"
-    return sorted(path.read_bytes().splitlines()) if path.is_file() else []
+WAYS = ("clock", "write", "full")
+# Lines that say when and how fast something was done differ between any two runs, and so does where it lies.
+EXEMPT = (rb'"began": "[^"]*"', rb'"windows_per_s": [\d.e+-]+', rb'"suite": "/[^"]*"')
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=20)
+@dataclass(frozen=True)
+class Work:
+    """What is stopped. out: the folder that it fills; needs: what it reads."""
+
+    verb: str
+    line: str
+    out: str
+    needs: tuple[str, ...]
+
+
+WORKS = (
+    Work("collect", "collect --out recording --config recording.toml --workers 1 --episodes 4 --duration 1",
+         "recording", ("recording.toml",)),
+    Work("train", "train --data recording --out training --config training.toml --steps 6 --history-steps 4"
+         " --evaluate-every 3", "training", ("recording", "training.toml")),
+    Work("benchmark", "benchmark --suite suite.json --agent oracle --workers 1 --out run", "run", ("suite.json",)),
+    Work("report", "report run --out report", "report", ("run", "suite.json")),
+)  # fmt: skip
+
+
+@dataclass
+class Tally:
+    """What was seen of one verb."""
+
+    kills: int = 0
+    full: int = 0  # disks that were full, of the kills
+    rounds: int = 0  # runs from nothing to the end
+    faults: tuple[str, ...] = ()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=50, help="of all verbs together")
+    parser.add_argument("--verbs", nargs="+", choices=[work.verb for work in WORKS], default=[w.verb for w in WORKS])
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--longest", type=float, default=12.0, help="seconds until a run is killed, at most")
     parser.add_argument("--out", type=Path, default=Path("out/kills"))
-    options, arguments = parser.parse_known_args()
-    arguments = arguments or ["--suite", "quick", "--agent", "oracle"]
-    rng, broken, whole = random.Random(options.seed), options.out / "broken", options.out / "whole"
-    for k in range(options.kills):
-        process = start(broken, arguments)
-        time.sleep(rng.uniform(0.2, options.longest))
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        print(f"killed {k + 1} times, {len(lines(broken))} episodes done", flush=True)
-    said = [start(out, arguments).communicate()[0] for out in (broken, whole)]
-    said = [text.replace(str(out).encode(), b"DIR") for text, out in zip(said, (broken, whole), strict=True)]
-    same_lines, same_tables = lines(broken) == lines(whole), said[0] == said[1]
-    print(f"{len(lines(whole))} episodes; same lines: {same_lines}; same tables: {same_tables}")
-    return int(not (same_lines and same_tables))
+    options = parser.parse_args(arguments)
+    load_the_program()
+    whole, tallies = fresh(options.out / "whole").resolve(), dict[str, Tally]()
+    for name, content in written_by_hand().items():
+        _write(whole / name, content)
+    for work in needed_for(options.verbs):
+        seconds = _unbroken(work, whole)
+        if work.verb in options.verbs:
+            with SmallDisk(options.out / "broken") as disk:
+                kills = share(options.kills, options.verbs.index(work.verb), len(options.verbs))
+                tallies[work.verb] = stop_again_and_again(
+                    work, whole, disk, kills, seconds, random.Random(f"{options.seed} {work.verb}")
+                )
+            print(row(work.verb, tallies[work.verb]), flush=True)
+    return int(any(tally.faults for tally in tallies.values()))
+
+
+def needed_for(verbs: Sequence[str]) -> list[Work]:
+    """Some verbs' works, and before them those that make what they read."""
+    wanted = [work for work in WORKS if work.verb in verbs]
+    needs = {need for work in wanted for need in work.needs}
+    return [work for work in WORKS if work in wanted or work.out in needs]
+
+
+def share(total: int, k: int, of: int) -> int:
+    """The k-th of so many equal parts, which are whole numbers."""
+    return total * (k + 1) // of - total * k // of
+
+
+def row(verb: str, tally: Tally) -> str:
+    ended = f"{tally.kills} times stopped, {tally.full} of them by a full disk, {tally.rounds} times finished"
+    return f"{verb:<10} {ended}: " + ("; ".join(tally.faults) or "the same files")
+
+
+def stop_again_and_again(
+    work: Work, whole: Path, disk: SmallDisk, kills: int, seconds: float, rng: random.Random
+) -> Tally:
+    """Stops a work so many times; each time that it is finished in between, it is compared and begun anew.
+
+    seconds: that the work takes when nobody stops it.
+    """
+    tally = Tally()
+    while tally.kills < kills or not tally.rounds:
+        here = disk.emptied()
+        for need in work.needs:
+            _copy(whole / need, here / need)
+        tally.rounds += 1
+        while tally.kills < kills and not _stopped_once(work, disk, seconds, rng, tally):
+            pass
+        code, said = Run(work, here).wait()
+        tally.faults += () if code == 0 else (f"exit code {code} in the end: {said.strip()[-300:]}",)
+        tally.faults += differences(whole / work.out, here / work.out)
+    return tally
+
+
+def _stopped_once(work: Work, disk: SmallDisk, seconds: float, rng: random.Random, tally: Tally) -> bool:
+    """Stops a work in the next way; returns whether it came to its end all the same."""
+    way = WAYS[(tally.kills + tally.rounds) % len(WAYS)]
+    if way == "clock":
+        code, said = Run(work, disk.path).wait(rng.uniform(0.0, seconds))
+    elif way == "write":
+        code, said = Run(work, disk.path, _killed_at_a_write(rng.randrange(1, 2 * len(tree(disk.path)) + 8))).wait()
+    else:
+        with disk.almost_full(int(10 ** rng.uniform(0, 5.5))) as limits:
+            code, said = Run(work, disk.path, limits=limits).wait()
+    if code == 0:
+        return True
+    tally.kills += 1
+    if way == "full":
+        tally.full += 1
+        tally.faults += () if code == 2 and _is_named(said) else (f"a full disk: exit code {code}, {said[-300:]!r}",)
+    elif code != -signal.SIGKILL:
+        tally.faults += (f"exit code {code}: {said.strip()[-300:]}",)
+    return False
+
+
+def _is_named(said: str) -> bool:
+    """Whether a full disk was named, in one sentence."""
+    return len(said.strip().splitlines()) == 1 and ("no room on the disk" in said or "file too large" in said)
+
+
+class Run:
+    """A child process that does a work in a folder. before: what it does first."""
+
+    def __init__(
+        self, work: Work, here: Path, before: Callable[[], None] | None = None, limits: Limits | None = None
+    ) -> None:
+        self.beside = fresh(here.parent / "said")
+        sys.stdout.flush()
+        self.process = os.fork()
+        if self.process == 0:
+            self._be_the_child(work, here, before, limits or Limits())
+
+    def _be_the_child(self, work: Work, here: Path, before: Callable[[], None] | None, limits: Limits) -> None:
+        code = 99
+        try:
+            confine(here, self.beside, limits)
+            if before is not None:
+                before()
+            from caldrive.cli import main
+
+            code = main(work.line.split())
+        finally:
+            try:
+                sys.stdout.flush()
+                sys.stderr.flush()
+            finally:
+                os._exit(code)
+
+    def wait(self, kill_after: float | None = None) -> tuple[int, str]:
+        """Waits for its end, or kills it after some seconds; its exit code, and what it said."""
+        began = time.monotonic()
+        while not (done := os.waitpid(self.process, os.WNOHANG))[0]:
+            if kill_after is not None and time.monotonic() - began > kill_after:
+                os.kill(self.process, signal.SIGKILL)
+            time.sleep(0.002)
+        return os.waitstatus_to_exitcode(done[1]), (self.beside / "stderr.txt").read_text(errors="replace")
+
+
+def _killed_at_a_write(number: int) -> Callable[[], None]:
+    """Kills the process at its so many-th fsync or replace, before or after it is done."""
+
+    def before() -> None:
+        left = number
+
+        def watched(call: Callable[..., None]) -> Callable[..., None]:
+            def counted(*arguments: object) -> None:
+                nonlocal left
+                left -= 1
+                if left == 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                call(*arguments)
+                left -= 1
+                if left == 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+            return counted
+
+        os.fsync, os.replace = watched(os.fsync), watched(os.replace)  # type: ignore[assignment]
+
+    return before
+
+
+def differences(whole: Path, broken: Path) -> tuple[str, ...]:
+    """How a folder differs from an unbroken run's, but for what is exempt; nothing where it does not."""
+    files = [{name: _comparable(content) for name, content in tree(folder).items()} for folder in (whole, broken)]
+    names = sorted(files[0].keys() | files[1].keys())
+    return tuple(
+        f"{name} {'differs' if name in files[0] and name in files[1] else 'is there only once'}"
+        for name in names
+        if files[0].get(name) != files[1].get(name)
+    )
+
+
+def _comparable(content: bytes) -> bytes:
+    for pattern in EXEMPT:
+        content = re.sub(pattern, b"", content)
+    return content
+
+
+def _unbroken(work: Work, whole: Path) -> float:
+    """Does a work without a stop, and returns how many seconds it took."""
+    began = time.monotonic()
+    code, said = Run(work, whole).wait()
+    if code:
+        raise RuntimeError(f"caldrive {work.line} ends with {code}: {said}")
+    return time.monotonic() - began
+
+
+def _copy(source: Path, target: Path) -> None:
+    shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """Tries bad inputs of every kind on the program and sorts the outcomes.
 
-    python -m scripts.attack [--inputs 2000] [--seed 0] [--out out/attack] [--only KIND]
+    python -m scripts.attack [--minutes 60] [--inputs 2000] [--seed 0] [--kinds suite map] [--lanes 2] [--out DIR]
+    python -m scripts.attack --replay out/attack/seed0/00123
 
-Prints a table of kinds and outcomes, and keeps every fault's files in --out. Ends with 0 where there is no fault.
+Prints a table of kinds and outcomes. Every fault's files stay in --out, where --replay runs them again. A campaign that
+was stopped goes on. Ends with 0 where there is no fault.
 """
 
 from __future__ import annotations
@@ -10,94 +12,81 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import random
-import shutil
 import sys
+import tempfile
 import time
-from collections import Counter
-from itertools import islice
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
-from scripts.attack.inputs import Attempt, attempts, prepare
-from scripts.attack.outcomes import Outcome, Verdict, run
+from scripts.attack.attempt import kept
+from scripts.attack.attempts import KINDS, Attempts
+from scripts.attack.campaign import SUMMARY, Row, faults, make_good, rows, summary, take, tried
+from scripts.attack.runner import Limits, load_the_program
 
 
-def tried(number: int, attempt: Attempt, good: Path, out: Path) -> Verdict:
-    """Runs an attempt in a folder of its own, which stays where there was a fault."""
-    folder = out / f"{number:05d}"
-    folder.mkdir(parents=True)
-    for name, content in attempt.files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    words = [word.replace("{dir}", str(folder)).replace("{good}", str(good)) for word in attempt.arguments]
-    verdict = run(words, folder, attempt.bad)
-    if verdict.outcome.fault:
-        about = {"kind": attempt.kind, "arguments": words, "outcome": verdict.outcome.value, "said": verdict.said}
-        (folder / "fault.json").write_text(json.dumps(about, indent=1))
-    else:
-        shutil.rmtree(folder)
-    return verdict
-
-
-def table(counts: Counter[tuple[str, Outcome]]) -> str:
-    """Kinds down, outcomes across."""
-    kinds = sorted({kind for kind, _ in counts})
-    rows = [["", *(outcome.value for outcome in Outcome)]]
-    rows += [[kind, *(str(counts[kind, outcome] or "") for outcome in Outcome)] for kind in kinds]
-    totals = (sum(counts[kind, outcome] for kind in kinds) for outcome in Outcome)
-    rows.append(["all", *(str(total or "") for total in totals)])
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
-
-
-def load_the_program() -> None:
-    """All that commands load when they run, so that children need not."""
-    os.environ.setdefault("LP_NUM_THREADS", "0")
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    import caldrive.benchmark.report.page
-    import caldrive.benchmark.runner
-    import caldrive.cli
-    import caldrive.collection.collect
-    import caldrive.driving.drive
-    import caldrive.perception.evaluation.report
-    import caldrive.perception.inference.predictor
-    import caldrive.perception.training.train
-    import caldrive.recordings.check
-    import caldrive.visualization.contact_sheet  # noqa: F401
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--inputs", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("out/attack"))
-    parser.add_argument("--only", help="one kind of input")
-    options = parser.parse_args()
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _parser().parse_args(arguments)
     load_the_program()
-    good, faults = (options.out / "good").resolve(), (options.out / f"seed{options.seed}").resolve()
-    shutil.rmtree(faults, ignore_errors=True)
-    prepare(
-        good, lambda words: 0 if run(words, _folder(options.out / "preparing"), False).outcome is Outcome.RAN else 1
-    )
-    stream = attempts(good, random.Random(options.seed))
-    chosen = (attempt for attempt in stream if options.only in (None, attempt.kind))
-    counts: Counter[tuple[str, Outcome]] = Counter()
+    if options.replay is not None:
+        return _replay(options.replay)
+    out = options.out.resolve() / f"seed{options.seed}"
+    out.mkdir(parents=True, exist_ok=True)
+    attempts = Attempts(options.seed, make_good(options.out.resolve(), options.kinds, Limits()), options.kinds)
     began = time.monotonic()
-    for number, attempt in enumerate(islice(chosen, options.inputs)):
-        verdict = tried(number, attempt, good, faults)
-        counts[attempt.kind, verdict.outcome] += 1
-        if verdict.outcome.fault or verdict.seconds > 20:
-            words = " ".join(attempt.arguments)[:150]
-            print(f"{number} {attempt.kind}: {verdict.outcome.value}, {verdict.seconds:.0f} s: {words}", flush=True)
-    print(table(counts))
-    print(f"{sum(counts.values())} inputs in {(time.monotonic() - began) / 60:.0f} minutes")
-    return int(any(outcome.fault for _, outcome in counts))
+    done = {row.number for row in rows(out)}
+    todo = [number for number in range(options.inputs) if number not in done]
+    lanes = [_lane(todo[k :: options.lanes], attempts, out, began + 60 * options.minutes) for k in range(options.lanes)]
+    for lane in lanes:
+        os.waitpid(lane, 0)
+    found, minutes = rows(out), (time.monotonic() - began) / 60
+    new = sum(row.number not in done for row in found)
+    print(summary(found, minutes * len(found) / max(1, new)))
+    bad = list(faults(found))
+    (out / SUMMARY).write_text(json.dumps([asdict(row) for row in bad], indent=1) + "\n")
+    return int(bool(bad))
 
 
-def _folder(path: Path) -> Path:
-    path.mkdir(parents=True, exist_ok=True)
-    return path.resolve()
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=60.0, help="no attempt begins after so many")
+    parser.add_argument("--inputs", type=int, default=100_000, help="at most so many attempts")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--lanes", type=int, default=2, help="attempts at the same time")
+    parser.add_argument("--out", type=Path, default=Path("out/attack"))
+    parser.add_argument("--replay", type=Path, help="a fault's folder, to be run again")
+    return parser
+
+
+def _lane(numbers: list[int], attempts: Attempts, out: Path, until: float) -> int:
+    """A process that takes some of the attempts, one after the other; returns its number."""
+    sys.stdout.flush()
+    if child := os.fork():
+        return child
+    code = 1
+    try:
+        for number in numbers:
+            if time.monotonic() > until:
+                break
+            _say(take(number, attempts[number], out, Limits()))
+        code = 0
+    finally:
+        sys.stdout.flush()
+        os._exit(code)
+
+
+def _say(row: Row) -> None:
+    for fault in faults([row]):
+        print(f"{fault.number} {fault.kind}: {fault.outcome}, {fault.why}: {fault.line[:200]}", flush=True)
+
+
+def _replay(folder: Path) -> int:
+    with tempfile.TemporaryDirectory() as name:
+        ended, found = tried(kept(folder), Path(name).resolve(), Limits())
+    print(ended.stdout + ended.stderr)
+    print(f"{found.outcome.value} {found.why}, exit code {ended.code}, {ended.seconds:.1f} s")
+    return int(found.outcome.fault)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Bad inputs from good ones: bytes, JSON, TOML and XML, changed at random."""
+"""Bytes, texts and JSON, changed at random. All changes are drawn from the generator that is given."""
 
 from __future__ import annotations
 
@@ -7,78 +7,103 @@ import random
 import re
 from typing import Any
 
+NUMBERS = ("0", "-1", "nan", "inf", "-inf", "1e308", "1e309", "-0.0", "0.1", "1e-320", "2147483648", "-2147483649",
+           "9223372036854775808", "99999999999999999999999999999999", "0x10", "1_000", "1,5", "٣")  # fmt: skip
 NASTY: tuple[Any, ...] = (
-    None, True, -1, 0, 1, 2**31, 2**63, 10**30, -0.0, 1e308, -1e308, 0.1, "", "nan", "x" * 5000, "\x00", "💥", "../..",
-    "/", [], {}, [[]], {"a": {}}, [None] * 3,
+    None, True, -1, 0, 1, 2**31, 2**63, 10**30, -0.0, 1e308, -1e308, 1e-320, 0.1, "", "x" * 5000, "\x00",
+    "\x1b[31m", "💥", "../..", "/", "%s", [], {}, [[]], {"a": {}}, [None] * 3,
 )  # fmt: skip
-WORDS = ("", "-1", "0", "nan", "inf", "-inf", "1e309", "99999999999999999999", "x" * 3000, "💥", "../..", "/", "a b",
-         "1,2,3,4", "True", "[]", "0x10", " ", "%s", "{}", "none", "1.5", "-0", "\n", "/dev/null", "10000000",
-         "/proc/self/mem")  # fmt: skip
+TEXTS = ("", "x" * 3000, "💥", "\x00", "../..", "/", "a b", "[]", "{}", "%s", "none", "true", "\n", '"', "'", "<",
+         "]]>", "&lt;", "\ufeff", "\x1b[31m")  # fmt: skip
 
 
 def of_bytes(content: bytes, rng: random.Random) -> bytes:
-    """Bits turned over, parts cut off, doubled, wiped or strewn in."""
+    """Bits turned over, or a part cut off, doubled, wiped, taken out or strewn in."""
     if not content:
-        return bytes(rng.randrange(256) for _ in range(16))
+        return rng.randbytes(16)
     at, size = rng.randrange(len(content)), rng.choice((1, 4, 64, 4096))
-    middle = content[at : at + size]
-    kind = rng.randrange(7)
-    if kind == 0:
-        turned = bytearray(content)
-        for _ in range(rng.choice((1, 8, 200))):
-            turned[rng.randrange(len(turned))] ^= 1 << rng.randrange(8)
-        return bytes(turned)
-    if kind == 1:
-        return content[:at]
-    if kind == 2:
-        return content[at:]
-    if kind == 3:
-        return content[:at] + middle + content[at:]
-    if kind == 4:
-        return content[:at] + bytes(len(middle)) + content[at + len(middle) :]
-    if kind == 5:
-        return content[:at] + content[at + len(middle) :]
-    return content[:at] + rng.randbytes(size) + content[at:]
-
-
-def of_json(content: bytes, rng: random.Random) -> bytes:
-    """One value of a JSON text replaced, taken out, doubled or nested deep; sometimes its bytes changed."""
-    if rng.random() < 0.2:
-        return of_bytes(content, rng)
-    values = json.loads(content)
-    for _ in range(rng.choice((1, 1, 2, 5))):
-        values = _changed(values, rng)
-    return json.dumps(values).encode()
-
-
-def _changed(value: Any, rng: random.Random) -> Any:
-    inside = (
-        list(value.items()) if isinstance(value, dict) else list(enumerate(value)) if isinstance(value, list) else []
+    before, middle, after = content[:at], content[at : at + size], content[at + size :]
+    changes = (
+        lambda: _bits_turned(content, rng.choice((1, 8, 200)), rng),
+        lambda: before,
+        lambda: middle + after,
+        lambda: before + middle + middle + after,
+        lambda: before + bytes(len(middle)) + after,
+        lambda: before + after,
+        lambda: before + rng.randbytes(size) + middle + after,
+        lambda: b"",
+        lambda: b"\xff\xfe" + content,
     )
-    if not inside or rng.random() < 0.15:
-        return rng.choice(NASTY)
-    key, part = rng.choice(inside)
-    kind = rng.random()
-    if isinstance(value, dict):
-        if kind < 0.1:
-            return {name: one for name, one in value.items() if name != key}
-        if kind < 0.2:
-            return value | {rng.choice(WORDS): part}
-        return value | {key: _changed(part, rng)}
-    if kind < 0.1:
-        return value[:key] + value[key + 1 :]
-    if kind < 0.2:
-        return [*value, part]
-    return [*value[:key], _changed(part, rng), *value[key + 1 :]]
+    return rng.choices(changes, (3, 3, 1, 2, 2, 2, 2, 0.3, 0.3))[0]()
+
+
+def _bits_turned(content: bytes, n: int, rng: random.Random) -> bytes:
+    turned = bytearray(content)
+    for _ in range(n):
+        turned[rng.randrange(len(turned))] ^= 1 << rng.randrange(8)
+    return bytes(turned)
 
 
 def of_text(content: bytes, rng: random.Random) -> bytes:
-    """One number or word of a text (TOML, XML attributes) replaced; sometimes its bytes changed."""
-    if rng.random() < 0.3:
-        return of_bytes(content, rng)
-    text = content.decode()
-    spots = list(re.finditer(r'(?<==)"[^"]*"|-?\d+\.?\d*(?:e-?\d+)?|\b[a-z_]{3,}\b', text))
-    for spot in rng.sample(spots, min(len(spots), rng.choice((1, 1, 3)))):
-        quote = '"' if spot.group().startswith('"') else ""
-        text = text.replace(spot.group(), f"{quote}{rng.choice(WORDS)}{quote}", 1)
+    """Some numbers or words of a text (TOML, XML) replaced, some of its lines gone or there twice."""
+    text = content.decode(errors="replace")
+    if rng.random() < 0.2:
+        lines = text.splitlines(keepends=True)
+        at = rng.randrange(len(lines)) if lines else 0
+        return "".join(lines[:at] + rng.choice(([], 2 * lines[at : at + 1])) + lines[at + 1 :]).encode()
+    spots = list(re.finditer(r'"[^"\n]*"|-?\d+\.?\d*(?:e-?\d+)?|\b[a-zA-Z_]{3,}\b', text))
+    chosen = rng.sample(spots, min(len(spots), rng.choice((1, 1, 1, 3))))
+    for spot in sorted(chosen, key=lambda spot: -spot.start()):
+        text = text[: spot.start()] + _other_word(spot.group(), rng) + text[spot.end() :]
     return text.encode(errors="replace")
+
+
+def _other_word(word: str, rng: random.Random) -> str:
+    """Something that stands where a number stood where that was one; quotes stay."""
+    if word.startswith('"'):
+        return f'"{_other_word(word[1:-1], rng)}"'
+    numeric = re.fullmatch(r"-?\d+\.?\d*(?:e-?\d+)?", word)
+    return rng.choice(NUMBERS if numeric and rng.random() < 0.8 else TEXTS)
+
+
+def of_json(content: bytes, rng: random.Random) -> bytes:
+    """Some values of a JSON text replaced, taken out, doubled or renamed; now and then nested deep, or NaN."""
+    try:
+        values = json.loads(content)
+    except ValueError:
+        return of_bytes(content, rng)
+    if rng.random() < 0.03:
+        return b"[" * 100_000 + b"]" * 100_000
+    for _ in range(rng.choice((1, 1, 1, 2, 5))):
+        values = _changed(values, rng)
+    text = json.dumps(values)
+    if rng.random() < 0.1:  # what Python writes and JSON does not know
+        text = re.sub(r"\d+\.\d+", lambda found: rng.choice(("NaN", "Infinity", found.group())), text)
+    return text.encode()
+
+
+def _changed(value: Any, rng: random.Random) -> Any:
+    """A value with one change somewhere inside."""
+    if not isinstance(value, dict | list) or not value or rng.random() < 0.05:
+        return _other_value(value, rng)
+    kind = rng.random()
+    if isinstance(value, list):
+        at = rng.randrange(len(value))
+        if kind < 0.1:
+            return value[:at] + value[at + 1 :]
+        return [*value, value[at]] if kind < 0.2 else [*value[:at], _changed(value[at], rng), *value[at + 1 :]]
+    key = rng.choice(list(value))
+    if kind < 0.07:
+        return {name: one for name, one in value.items() if name != key}
+    if kind < 0.14:
+        return value | {rng.choice(TEXTS): value[key]}
+    return value | {key: _changed(value[key], rng)}
+
+
+def _other_value(value: Any, rng: random.Random) -> Any:
+    """Mostly of the same type, as others are refused at the door."""
+    alike = [other for other in NASTY if type(other) is type(value)]
+    numbers = [other for other in NASTY if isinstance(other, int | float) and not isinstance(other, bool)]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        alike = [*numbers, -value, value + 1, value * 10]
+    return rng.choice(alike) if alike and rng.random() < 0.7 else rng.choice(NASTY)
