@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("out/kills"))
     options = parser.parse_args(arguments)
     load_the_program()
-    whole, tallies = fresh(options.out / "whole").resolve(), dict[str, Tally]()
+    whole, tallies = fresh(options.out / "whole" / "here").resolve(), dict[str, Tally]()
     for name, content in written_by_hand().items():
         _write(whole / name, content)
     for work in needed_for(options.verbs):
@@ -138,24 +138,25 @@ def _stopped_once(work: Work, disk: SmallDisk, seconds: float, rng: random.Rando
     tally.kills += 1
     if way == "full":
         tally.full += 1
-        tally.faults += () if code == 2 and _is_named(said) else (f"a full disk: exit code {code}, {said[-300:]!r}",)
+        tally.faults += () if code == 2 and named_as_full(said) else (f"full disk: exit code {code}, {said[-300:]!r}",)
     elif code != -signal.SIGKILL:
         tally.faults += (f"exit code {code}: {said.strip()[-300:]}",)
     return False
 
 
-def _is_named(said: str) -> bool:
+def named_as_full(said: str) -> bool:
     """Whether a full disk was named, in one sentence."""
     return len(said.strip().splitlines()) == 1 and ("no room on the disk" in said or "file too large" in said)
 
 
 class Run:
-    """A child process that does a work in a folder. before: what it does first."""
+    """A child process that does a work in a folder. before: what it does first. What it says lies elsewhere, as the
+    folder's disk may be full."""
 
     def __init__(
         self, work: Work, here: Path, before: Callable[[], None] | None = None, limits: Limits | None = None
     ) -> None:
-        self.beside = fresh(here.parent / "said")
+        self.beside = fresh(here.parents[1] / "said")
         sys.stdout.flush()
         self.process = os.fork()
         if self.process == 0:

@@ -70,13 +70,15 @@ def _settings() -> Iterator[Attempt]:
 def _suites(good: dict[str, bytes]) -> Iterator[Attempt]:
     words = tuple(shlex.split(f"{BENCHMARK} --suite suite.json --out out"))
     trial = json.loads(good["suite.json"])[0]
-    texts = [b"", b"[]", b"{}", b"null", b"[null]", b"[[]]", b"\xff", json.dumps([trial, trial]).encode()]
+    texts = {"no trials": b"[]", "a key twice": json.dumps([trial, trial]).encode()}
+    texts |= {f"the text {text!r}": text for text in (b"", b"{}", b"null", b"[null]", b"[[]]", b"\xff")}
     for name, values in TRIALS.items():
-        texts += [json.dumps([trial | {name: value}]).encode() for value in values]
+        texts |= {f"{name} {value!r:.40}": json.dumps([trial | {name: value}]).encode() for value in values}
     for name, values in SCENARIOS.items():
-        texts += [json.dumps([trial | {"scenario": trial["scenario"] | {name: value}}]).encode() for value in values]
-    for text in texts:
-        yield Attempt("suite", words, {"suite.json": text}, "no such trial can be")
+        changed = {f"{name} {value!r:.40}": trial["scenario"] | {name: value} for value in values}
+        texts |= {what: json.dumps([trial | {"scenario": values}]).encode() for what, values in changed.items()}
+    for what, text in texts.items():
+        yield Attempt("suite", words, {"suite.json": text}, f"{what} cannot be")
 
 
 def _code() -> Iterator[Attempt]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 HEAD = "import numpy as np\nfrom caldrive import *\nfrom caldrive.datatypes import *\n"
-SEEN = "Observation(0.0, np.zeros((4, 4, 3), np.uint8), 0.0, Command.STRAIGHT)"
+SEEN = "Observation(self.time, np.zeros((4, 4, 3), np.uint8), 0.0, Command.STRAIGHT)"
 CAR, ROUTE = "VehicleState(Pose(0, 0, 0))", "route_length=9.0, goal_distance=9.0"
 WORLD = {
-    "reset": ("self, scenario", f"return {SEEN}"),
-    "step": ("self, control", f"return {SEEN}"),
-    "truth": ("self", f"return Truth(time=0.0, ego={CAR}, affordances=Affordances(), {ROUTE})"),
+    "reset": ("self, scenario", f"self.time = 0.0; return {SEEN}"),
+    "step": ("self, control", f"self.time += 0.1; return {SEEN}"),
+    "truth": ("self", f"return Truth(time=self.time, ego={CAR}, affordances=Affordances(), {ROUTE})"),
     "close": ("self", "pass"),
 }
 
@@ -66,7 +66,7 @@ CONTROLLERS = (
 WORLDS = (
     *NO_CLASS,
     *(_world(reset=body) for body in ("return None", "return 1 / 0", "raise ValueError", "raise SystemExit")),
-    *(_world(step=body) for body in ("return None", "return 1 / 0", "raise SystemExit")),
+    *(_world(step=body) for body in ("return None", "return 1 / 0", "raise SystemExit", f"return {SEEN}")),
     *(_world(truth=body) for body in (
         "return None", "return 1 / 0", f"return Truth(time=0.0, ego=None, affordances=Affordances(), {ROUTE})",
         f"return Truth(time=float('nan'), ego={CAR}, affordances=Affordances(), {ROUTE})",

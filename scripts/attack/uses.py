@@ -55,7 +55,7 @@ USES = (
     Use("network", "see pictures --model training/model.safetensors", ("pictures", "training"), "*/model.*"),
     Use("network", f"{TRAIN_NEW} --initial training/model.safetensors",
         ("recording", "training.toml", "training"), "*/model.*"),
-    Use("state", TRAIN, ("recording", "training.toml", "training"), "training/*"),
+    Use("state", TRAIN, ("recording", "training.toml", "training"), "training/[ms]*"),
     Use("map", f"{DRIVE} --town map.xodr --from 20,-2 --to 80,-2", ("map.xodr",), "map.xodr"),
     Use("map", f"{DRIVE} --town crossing.xodr --task straight", ("crossing.xodr",), "crossing.xodr"),
     Use("map", "town --town map.xodr --plan plan.png", ("map.xodr",), "map.xodr"),

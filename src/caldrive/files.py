@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import is_dataclass
+from glob import escape
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,7 +20,7 @@ import msgspec
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that it appears whole or not at all. Raises OSError, which names the file."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = temporary_path(path)
     try:
         with temporary.open("wb") as file:
             file.write(content)
@@ -30,6 +31,25 @@ def write_whole(path: Path, content: bytes) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def temporary_path(path: Path) -> Path:
+    """Where a file is written before it takes its name. What processes that were killed left there is removed."""
+    for old in path.parent.glob(f".{escape(path.name)}.*.tmp"):
+        if not _lives(old.name.split(".")[-2]):
+            old.unlink(missing_ok=True)
+    return path.with_name(f".{path.name}.{os.getpid()}.tmp")
+
+
+def _lives(number: str) -> bool:
+    """Whether there is a process of this number; True for what is no number, as that is somebody else's."""
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except (ValueError, OverflowError, PermissionError):
+        pass
+    return True
 
 
 def write_figure(path: Path, figure: Any, dpi: int = 90) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image as Picture
 
 from caldrive.datatypes import Image, Step
+from caldrive.files import temporary_path
 from caldrive.interfaces import World, is_mapped, is_recordable
 from caldrive.results import EpisodeResult, Infraction
 from caldrive.scenarios import Scenario
@@ -37,7 +38,7 @@ class VideoWriter:
 
     def __init__(self, path: Path, rate: float = 10.0) -> None:
         self.path, self.rate, self.frames = path, rate, 0
-        self._temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        self._temporary = temporary_path(path)
         self._container: Any = None
         self._stream: Any = None
 
