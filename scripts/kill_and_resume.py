@@ -207,7 +207,7 @@ def _killed_at_a_write(number: int) -> Callable[[], None]:
 
             return counted
 
-        os.fsync, os.replace = watched(os.fsync), watched(os.replace)  # type: ignore[assignment]
+        os.fsync, os.replace = watched(os.fsync), watched(os.replace)
 
     return before
 

@@ -132,8 +132,8 @@ def _picture(name: str, content: bytes) -> Values:
 
 
 def _film(name: str, content: bytes) -> Values:
-    with av.open(io.BytesIO(content)) as film:
-        if not sum(1 for _ in film.decode(video=0)):
+    with av.open(io.BytesIO(content), "r") as film:
+        if not list(film.decode(video=0)):
             raise ValueError("it has no frame")
     return iter(())
 

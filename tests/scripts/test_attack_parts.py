@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from safetensors.numpy import save
+
 from scripts.attack import campaign, oracles, words
 from scripts.attack.attempt import Attempt, keep, kept
 from scripts.attack.attempts import Attempts
@@ -28,7 +29,6 @@ from scripts.attack.outputs import impossible, leftovers, snapshot, torn
 from scripts.attack.runner import Ended
 from scripts.attack.verdicts import Outcome, verdict
 from scripts.attack.words import Option
-
 from tests.documentation import ROOT
 
 SEEDS = st.integers(0, 2**32)

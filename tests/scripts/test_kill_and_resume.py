@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from scripts.kill_and_resume import Tally, differences, named_as_full, needed_for, row, share
 
+from scripts.kill_and_resume import Tally, differences, named_as_full, needed_for, row, share
 from tests.documentation import ROOT
 
 
