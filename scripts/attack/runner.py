@@ -27,7 +27,7 @@ class Limits:
     """Of a child and its own children together; seconds by the clock are many, as others use the machine, too."""
 
     seconds: float = 600.0
-    cpu_seconds: float = 25.0
+    cpu_seconds: float = 15.0
     gigabytes: float = 4.0
     address_space: float = 16e9
     file_size: int = 1_000_000_000
