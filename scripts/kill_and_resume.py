@@ -189,24 +189,22 @@ class Run:
 
 
 def _killed_at_a_write(number: int) -> Callable[[], None]:
-    """Kills the process at its so many-th fsync or replace, before or after it is done."""
+    """Kills a process before or after one of its calls of fsync and replace, the so many-th of these moments."""
+    moments = iter(range(1, number))
+
+    def live_or_die() -> None:
+        if next(moments, None) is None:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    def watched(call: Callable[..., None]) -> Callable[..., None]:
+        def between(*arguments: object) -> None:
+            live_or_die()
+            call(*arguments)
+            live_or_die()
+
+        return between
 
     def before() -> None:
-        left = number
-
-        def watched(call: Callable[..., None]) -> Callable[..., None]:
-            def counted(*arguments: object) -> None:
-                nonlocal left
-                left -= 1
-                if left == 0:
-                    os.kill(os.getpid(), signal.SIGKILL)
-                call(*arguments)
-                left -= 1
-                if left == 0:
-                    os.kill(os.getpid(), signal.SIGKILL)
-
-            return counted
-
         os.fsync, os.replace = watched(os.fsync), watched(os.replace)
 
     return before

@@ -68,9 +68,9 @@ WORLDS = (
     *(_world(reset=body) for body in ("return None", "return 1 / 0", "raise ValueError", "raise SystemExit")),
     *(_world(step=body) for body in ("return None", "return 1 / 0", "raise SystemExit", f"return {SEEN}")),
     *(_world(truth=body) for body in (
-        "return None", "return 1 / 0", f"return Truth(time=0.0, ego=None, affordances=Affordances(), {ROUTE})",
+        "return None", "return 1 / 0", f"return Truth(time=self.time, ego=None, affordances=Affordances(), {ROUTE})",
         f"return Truth(time=float('nan'), ego={CAR}, affordances=Affordances(), {ROUTE})",
-        f"return Truth(time=0.0, ego=VehicleState(Pose(float('nan'), 0, 0)), affordances=Affordances(), {ROUTE})",
+        f"return Truth(time=self.time, ego=VehicleState(Pose(float('nan'), 0, 0)), affordances=Affordances(), {ROUTE})",
     )),
     *(_world(dt) for dt in ("0", "-1", "None", "'x'", "float('nan')", "1e308")),
 )  # fmt: skip
