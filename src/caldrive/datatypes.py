@@ -162,12 +162,14 @@ class CameraConfig:
 
 @dataclass(frozen=True)
 class Observation:
-    """All that an agent may see: time (s), image (H, W, 3), speed (m/s) and the command."""
+    """All that an agent may see: time (s), image (H, W, 3), speed (m/s) and the command. image_time: when the image was
+    taken (s), None for now."""
 
     time: float
     image: Image
     speed: float
     command: Command
+    image_time: float | None = None
 
 
 @dataclass(frozen=True)

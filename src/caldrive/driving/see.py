@@ -66,7 +66,7 @@ def see(settings: SeeSettings, progress: Progress = silent) -> SeeReport:
     require_within("--every", settings.every, 1, 1_000_000, 1)
     crop = None if settings.crop is None else parse_crop(settings.crop)
     source = open_source(settings.source, settings.every)
-    network = NetworkPerception(model_path(settings.model))
+    network = NetworkPerception(model_path(settings.model), watchdog=False)
     size = network.network.config.image_width, network.network.config.image_height
     viewer = Viewer(network, size, Command(settings.command), crop)
     with VideoWriter(settings.out, rate=source.rate / source.every) as video:

@@ -11,6 +11,8 @@ from caldrive.datatypes import Affordances, Observation
 from caldrive.interfaces import BadImage
 from caldrive.perception.images import check_image, normalise, to_float
 from caldrive.perception.inference.engines import INTEGERS, backbone_engine, blocks_engine, driving_precision
+from caldrive.perception.inference.watchdog import Watchdog
+from caldrive.perception.network.camera_check import load_camera_check
 from caldrive.perception.network.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.network.network import COMMANDS, Network
 from caldrive.perception.targets import decode
@@ -21,14 +23,25 @@ class NetworkPerception:
 
     Before the first frame there is the first frame again, as in training. precision: of the backbone,
     see `driving_precision`; a network that is no file has no ranges. threads: how many it may use, None leaves torch's
-    as they are. Raises BadImage, and then forgets nothing.
+    as they are. watchdog: whether to notice a camera that fails while the car drives; pictures from elsewhere are no
+    drive. Raises BadImage, and then forgets nothing.
     """
 
-    def __init__(self, network: Network | Path | str, precision: str = "auto", threads: int | None = None) -> None:
+    def __init__(
+        self,
+        network: Network | Path | str,
+        precision: str = "auto",
+        threads: int | None = None,
+        *,
+        watchdog: bool = True,
+    ) -> None:
+        check = None
         if isinstance(network, Network):
             info = CheckpointInfo(network.config)
         else:
+            check = load_camera_check(network)
             network, info = load_network(network)
+        self._watchdog = Watchdog(*(check or ())) if watchdog else None
         self.network, precision = network.eval(), driving_precision(precision, info.ranges)
         if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
             torch.set_num_threads(1 if precision in INTEGERS else threads)
@@ -39,12 +52,17 @@ class NetworkPerception:
     def reset(self) -> None:
         """An episode begins: forget the last one's frames."""
         self._history = None
+        if self._watchdog is not None:
+            self._watchdog.reset()
 
     @torch.inference_mode()
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
         check_image(observation.image, self.network.config.image_size)
-        features = self._backbone(normalise(to_float(observation.image[None])))[:, None]  # (1, 1, F)
+        images = normalise(to_float(observation.image[None]))
+        if self._watchdog is not None:
+            self._watchdog.look(observation, images)
+        features = self._backbone(images)[:, None]  # (1, 1, F)
         if not bool(features.isfinite().all()):
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:

@@ -23,6 +23,7 @@ from caldrive.perception.network.network import Network
 
 FORMAT_VERSION = 2
 KEY = "caldrive"  # of the JSON in safetensors' metadata
+CAMERA_CHECK = "camera_check."  # what the names of the camera check's tensors begin with
 UNFINISHED = "unfinished.safetensors"  # a network in the folder of a training that goes on
 FLOATS = ("F64", "F32", "F16", "BF16")  # safetensors' names
 SMALLEST_SPREAD = 1e-12  # of the values of a matrix of weights; the smallest that 16 bits tell apart is 6e-8
@@ -108,7 +109,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return load(path.read_bytes()), header
 
 
-def _is_weight(value: Tensor) -> bool:
+def is_weight(value: Tensor) -> bool:
     """Not a bias, nor a statistic of a batch norm."""
     return value.is_floating_point() and value.dim() > 1
 
@@ -116,7 +117,7 @@ def _is_weight(value: Tensor) -> bool:
 def round_to_half(network: Network) -> None:
     """Rounds a network's weights in place to what 16 bits can hold, so that it is measured as it is stored."""
     for value in network.state_dict().values():
-        if _is_weight(value):
+        if is_weight(value):
             value.copy_(value.half())
 
 
@@ -124,7 +125,7 @@ def save_network(path: Path | str, network: Network, info: CheckpointInfo, half:
     """Write a network; `half` stores weights, though not batch norm's statistics, in 16 bits."""
     state = network.state_dict()
     if half:
-        state = {k: v.half() if _is_weight(v) else v for k, v in state.items()}
+        state = {k: v.half() if is_weight(v) else v for k, v in state.items()}
     write_tensors(Path(path), state, {"kind": "network", "specs": describe()} | asdict(info))
 
 
@@ -157,14 +158,19 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
     info = read_info(path)
     _require_shapes(path, info.config)
     network = Network(info.config)
-    network.load_state_dict({name: _single(value) for name, value in load(path.read_bytes()).items()})
+    network.load_state_dict(single_precision(load(path.read_bytes()), camera_check=False))
     if fault := _fault(network, info):
         raise CheckpointError(f"found in {path} {fault}, wanted a trained network: train it again")
     return network.eval(), info
 
 
-def _single(value: Tensor) -> Tensor:
-    return value.float() if value.dtype == torch.float16 else value
+def single_precision(tensors: dict[str, Tensor], *, camera_check: bool) -> dict[str, Tensor]:
+    """Of a network's file the camera check's tensors, by their own names, or all others; 16 bits as 32."""
+    return {
+        name.removeprefix(CAMERA_CHECK if camera_check else ""): value.float() if value.dtype == torch.float16 else value
+        for name, value in tensors.items()
+        if name.startswith(CAMERA_CHECK) == camera_check
+    }
 
 
 def _require_shapes(path: Path, config: NetworkConfig) -> None:
@@ -173,7 +179,8 @@ def _require_shapes(path: Path, config: NetworkConfig) -> None:
     with torch.device("meta"):
         state = Network(config).state_dict()
     with safe_open(path, "pt") as file:
-        slices = {name: file.get_slice(name) for name in file.keys()}  # noqa: SIM118 (it is no dictionary)
+        names = [name for name in file.keys() if not name.startswith(CAMERA_CHECK)]  # noqa: SIM118 (no dictionary)
+        slices = {name: file.get_slice(name) for name in names}
         found = {name: (part.get_shape(), part.get_dtype() in FLOATS) for name, part in slices.items()}
     if found != {name: (list(value.shape), value.is_floating_point()) for name, value in state.items()}:
         raise CheckpointError(
