@@ -28,8 +28,8 @@ TINY = NetworkConfig(
     center_distance=BlockConfig("dense", 8, 0.0),
 )
 SHORT = TrainingConfig(
-    steps=6, batch=4, window=3, warm_up=2, history_steps=0, evaluate_every=100, save_every=2, precision="fp32",
-    validation_share=0.3,
+    steps=6, batch=4, window=3, warm_up=2, history_steps=0, camera_check_steps=0, evaluate_every=100, save_every=2,
+    precision="fp32", validation_share=0.3,
 )  # fmt: skip
 HISTORY = replace(SHORT, steps=11, history_steps=5, history_batch=8)  # with a second stage
 

@@ -166,8 +166,9 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
 
 def single_precision(tensors: dict[str, Tensor], *, camera_check: bool) -> dict[str, Tensor]:
     """Of a network's file the camera check's tensors, by their own names, or all others; 16 bits as 32."""
+    prefix = CAMERA_CHECK if camera_check else ""
     return {
-        name.removeprefix(CAMERA_CHECK if camera_check else ""): value.float() if value.dtype == torch.float16 else value
+        name.removeprefix(prefix): value.float() if value.dtype == torch.float16 else value
         for name, value in tensors.items()
         if name.startswith(CAMERA_CHECK) == camera_check
     }

@@ -45,6 +45,7 @@ LIMITS: Limits = {
     "balance": (0.0, 1.0),
     "alternative_share": (0.0, 1.0),
     "history_batch": (1, 100_000),
+    "camera_check_steps": (0, 10_000_000),
     "backbone_chunk": (0, 1_000_000),
     "validation_share": (0.0, 1.0),
     "evaluate_every": (1, 10_000_000),
@@ -87,6 +88,9 @@ class TrainingConfig:
     history from the first step."""
     history_batch: int = 256
     """Windows with their history in a step of the second stage."""
+    camera_check_steps: int = 3_000
+    """Steps of the third stage, in which the camera check learns what a working camera's images look like; no more than
+    --steps. 0 leaves it out."""
     backbone_chunk: int = 0
     """Images that pass the backbone together, with gradient checkpointing, where a batch finds no room in memory; 0 for
     all of them. Only without batch norm, which looks at a whole batch."""

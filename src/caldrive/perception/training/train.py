@@ -16,8 +16,10 @@ from caldrive.perception.dataset.sampler import data_summary
 from caldrive.perception.evaluation.evaluate import evaluate
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network.calibration import calibrated, input_ranges
+from caldrive.perception.network.camera_check import add_camera_check, load_camera_check
 from caldrive.perception.network.checkpoint import CheckpointInfo, read_info, round_to_half, save_network
 from caldrive.perception.network.config import NetworkConfig
+from caldrive.perception.training.camera_check_stage import evidence_thresholds, train_camera_check
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.perception.training.distributed import join_process_group
 from caldrive.perception.training.folder import Row, TrainingFolder, draw_curves
@@ -110,8 +112,8 @@ def _step(run: TrainingRun, validation: Frames, folder: TrainingFolder) -> None:
 
 
 def _finish(run: TrainingRun, validation: Frames, folder: TrainingFolder, progress: Progress) -> None:
-    """What makes a finished network of a whole one, unless it is there already. One that somebody removed comes
-    again."""
+    """What makes a finished network of a whole one, unless it is there already, and its camera check. A network that
+    somebody removed comes again."""
     if not folder.has_finished(run.config.steps):
         if not folder.unfinished.is_file():
             validate(run, validation, folder.unfinished, run.context)
@@ -120,6 +122,10 @@ def _finish(run: TrainingRun, validation: Frames, folder: TrainingFolder, progre
         else:
             os.replace(folder.unfinished, folder.model)
     folder.remove_unfinished()
+    steps = min(run.config.camera_check_steps, run.config.steps)
+    if steps and load_camera_check(folder.model) is None:
+        check = train_camera_check(run.sampler.frames, steps, run.config.seed, progress)
+        add_camera_check(folder.model, check, evidence_thresholds(check, validation))
 
 
 def _train_history(run: TrainingRun, validation: Frames, folder: TrainingFolder, progress: Progress) -> None:
