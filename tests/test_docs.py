@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image as Picture
-from scripts.kept_reports import SUITES, report_again
 
 import caldrive
 from caldrive.benchmark.suites import suite, to_json
@@ -19,6 +18,7 @@ from caldrive.commands import VERBS
 from caldrive.commands.answer import Configurable
 from caldrive.visualization import contact_sheet
 from caldrive.visualization.episode_video import VideoWriter
+from scripts.kept_reports import SUITES, report_again
 from tests.documentation import (
     DOCS,
     PAGES,

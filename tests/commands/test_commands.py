@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from rich.table import Table
 from rich.text import Text
-from scripts.every_verb import COMMANDS, words
 
 from caldrive.agents.settings import AgentSettings
 from caldrive.cli import _print, main, parse
@@ -25,6 +24,7 @@ from caldrive.driving.determinism import Comparison, EpisodeDigests, compare
 from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.timing import Stopwatch
 from caldrive.visualization.hud import SIZE
+from scripts.every_verb import COMMANDS, words
 from tests.command_line import run_json
 
 DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]

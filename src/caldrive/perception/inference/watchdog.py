@@ -17,7 +17,7 @@ from torch import Tensor
 
 from caldrive.datatypes import Image, Observation
 from caldrive.interfaces import BadImage
-from caldrive.perception.network.camera_check import REASONS, WINDOWS, averaged, evidence
+from caldrive.perception.network.camera_check import REASONS, WINDOW, averaged, evidence
 
 CELL = 8  # pixels a side of the cells in which images are compared
 
@@ -66,7 +66,7 @@ class Watchdog:
     def reset(self) -> None:
         """An episode begins."""
         self._stillness = Stillness(self.config)
-        self._evidence: deque[NDArray[np.float32]] = deque(maxlen=max(WINDOWS))
+        self._evidence: deque[NDArray[np.float32]] = deque(maxlen=WINDOW)
         self._unlike = ""  # what is wrong, while the images are unlike the recording's
 
     def look(self, observation: Observation, images: Tensor) -> None:
@@ -82,7 +82,7 @@ class Watchdog:
             raise BadImage(f"{fault}: brake, and look at the camera")
 
     def _unlike_recording(self, images: Tensor) -> str:
-        """What is wrong with the images of the last seconds, or nothing."""
+        """What is wrong with the images of the last second, or nothing."""
         if self._check is None:
             return ""
         self._evidence.append(evidence(self._check(images))[0].numpy())

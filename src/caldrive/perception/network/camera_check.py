@@ -36,8 +36,7 @@ REASONS: dict[str, tuple[str, ...]] = {
     "blurred": ("blurred",),
     "partly covered": ("half covered", "dirt on the lens"),
 }
-# Frames over which the evidence for each is averaged: in the middle of a road a car sees for a while what mirrors show.
-WINDOWS = tuple(30 if name == "mirrored" else 10 for name in REASONS)
+WINDOW = 10  # frames over which the evidence is averaged
 KEY = "camera_check"  # of its thresholds in the header of a network's file
 CHANNELS = (16, 24, 32, 48)
 NODES, DROPOUT = 32, 0.3
@@ -80,9 +79,9 @@ def evidence(outputs: Tensor) -> Tensor:
 
 
 def averaged(odds: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """For each reason the mean (reasons,) of its evidence (T, reasons) over the last frames of its window; before the
-    first frame there is no evidence."""
-    return np.array([odds[-window:, k].sum() / window for k, window in enumerate(WINDOWS)])
+    """For each reason the mean (reasons,) of its evidence (T, reasons) over the last WINDOW frames; before the first
+    frame there is no evidence."""
+    return np.asarray(odds[-WINDOW:].sum(axis=0, dtype=np.float64) / WINDOW)
 
 
 def add_camera_check(path: Path, check: CameraCheck, thresholds: Sequence[float]) -> None:
