@@ -44,7 +44,7 @@ MISTAKES = {
     "a damaged episode, to learn from": (["train", "--data", "{tmp}/damaged", "--out", "{tmp}"], "record again"),
     "a damaged episode, to evaluate": (["evaluate", "--data", "{tmp}/damaged"], "record again"),
     "no episode to learn from": (["train", "--data", "{tmp}/folder.png", "--out", "{tmp}"], "caldrive collect"),
-    "no step to learn": (["train", "--steps", "0", "--out", "{tmp}"], "type --steps 11000"),
+    "no step to learn": (["train", "--steps", "0", "--out", "{tmp}"], "type --steps 14000"),
     "a rate of nothing": (["train", "--rate", "0", "--out", "{tmp}"], "type --learning-rate 0.001"),
     "a cap below nothing, in a suite": (["benchmark", "--cap", "-5", "--out", "{tmp}"], "type --cap 20"),
     "a cap that is no number, in a suite": (["benchmark", "--cap", "nan", "--out", "{tmp}"], "type --cap 20"),

@@ -7,7 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from caldrive.files import temporary_path, write_whole
+import pytest
+
+from caldrive.files import locked_folder, temporary_path, write_whole
 
 KILLED = """
 import os, sys
@@ -36,3 +38,20 @@ def test_what_others_write_at_this_moment_is_left_alone(tmp_path: Path) -> None:
         path.touch()
     assert temporary_path(tmp_path / "a.json") == kept[0]
     assert sorted(tmp_path.iterdir()) == sorted(kept)
+
+
+@pytest.mark.parametrize(("written", "left"), [([], []), (["file"], ["out", "out/run", "out/run/file"])])
+def test_a_folder_that_was_made_for_a_work_that_failed_goes_again(
+    tmp_path: Path, written: list[str], left: list[str]
+) -> None:
+    folder = tmp_path / "out" / "run"
+
+    def fail() -> None:
+        with locked_folder(folder):
+            for name in written:
+                (folder / name).touch()
+            raise ValueError("no use")
+
+    with pytest.raises(ValueError, match="no use"):
+        fail()
+    assert sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")) == left

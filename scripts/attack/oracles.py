@@ -29,7 +29,7 @@ def why_bad(name: str, content: bytes) -> str:
     try:
         wrong = look(name, content)
     except (ValueError, TypeError, KeyError, AttributeError, OSError, RecursionError, ET.ParseError, pa.ArrowException,
-            SafetensorError, SyntaxError, Image.DecompressionBombError) as error:  # fmt: skip
+            SafetensorError, SyntaxError, MemoryError, Image.DecompressionBombError) as error:  # fmt: skip
         wrong = f"{type(error).__name__}: {str(error)[:100]}"
     return f"{name}: {wrong}" if wrong else ""
 

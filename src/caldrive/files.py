@@ -7,7 +7,7 @@ import io
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import is_dataclass
 from glob import escape
 from itertools import chain
@@ -103,13 +103,20 @@ def _unknown(values: Any, known: Any) -> list[str]:
 def locked_folder(folder: Path) -> Iterator[None]:
     """Keeps a folder, made if need be, for this process; two that write at once would lose results.
 
-    The lock ends with the block, or with the process. Raises ValueError where another process has it.
+    The lock ends with the block, or with the process; folders that were made for a block that failed, and are empty,
+    go again. Raises ValueError where another process has it.
     """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     file = os.open(folder, os.O_RDONLY)
     try:
         _lock(file, folder)
         yield
+    except BaseException:
+        with suppress(OSError):  # something is in it
+            for path in made:
+                path.rmdir()
+        raise
     finally:
         os.close(file)
 

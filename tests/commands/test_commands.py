@@ -128,7 +128,8 @@ def test_an_image_that_tells_nothing_brakes_to_a_stand_and_says_why(model: str) 
         assert control.brake >= 0.3
         assert agent.decision is not None
         assert "black" in agent.decision.note
-    agent.act(Observation(0.0, black + 90, 0.0, Command.STRAIGHT))
+    picture = black + np.linspace(0, 200, camera.width, dtype=np.uint8)[:, None]
+    agent.act(Observation(0.0, picture, 0.0, Command.STRAIGHT))
     assert agent.decision is not None
     assert agent.decision.note == ""
 

@@ -12,7 +12,6 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network.camera_check import (
     MOST_EVIDENCE,
     REASONS,
-    WINDOW,
     CameraCheck,
     add_camera_check,
     averaged,
@@ -120,11 +119,12 @@ def test_the_evidence_is_within_what_one_image_may_count() -> None:
     assert evidence(outputs)[0].tolist() == [1.0, MOST_EVIDENCE, *[-MOST_EVIDENCE] * (len(REASONS) - 2)]
 
 
-def test_evidence_is_averaged_over_the_last_frames_and_missing_ones_count_nothing() -> None:
-    odds = np.ones((40, len(REASONS)))
-    odds[:-WINDOW] = 5.0
-    assert averaged(odds).tolist() == [1.0] * len(REASONS)
-    assert averaged(odds[-WINDOW // 2 :]).tolist() == [0.5] * len(REASONS)
+def test_evidence_is_averaged_over_each_reasons_window_and_missing_frames_count_nothing() -> None:
+    odds = np.ones((80, len(REASONS)))
+    odds[:-10] = 5.0
+    noise, mirrored = averaged(odds)[:2]
+    assert (noise, mirrored) == (1.0, pytest.approx((50 * 5 + 10) / 60))
+    assert averaged(odds[-5:])[0] == 0.5
 
 
 def test_a_training_that_was_stopped_before_its_camera_check_goes_on_with_it(tmp_path: Path) -> None:

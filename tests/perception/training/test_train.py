@@ -108,7 +108,9 @@ def test_a_network_carries_its_name_when_it_is_finished_and_not_before(
 
 def test_a_training_has_as_many_steps_as_were_asked_for(folder: Path, tmp_path: Path) -> None:
     said = []
-    config = TrainingConfig(steps=6, batch=4, history_batch=4, precision="fp32", validation_share=0.3)
+    config = TrainingConfig(
+        steps=6, batch=4, history_batch=4, camera_check_steps=0, precision="fp32", validation_share=0.3
+    )
     train(config, folder, tmp_path, TINY, progress=lambda label, share: said.append((label, share)))
     assert len((tmp_path / "metrics.jsonl").read_text().splitlines()) == 6
     assert (config.second_stage, TRAININGS["small"].second_stage, TRAININGS["paper"].second_stage) == (1, 3000, 0)

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from caldrive.datatypes import Image, Observation
 from caldrive.interfaces import BadImage
-from caldrive.perception.network.camera_check import REASONS, WINDOW, averaged, evidence
+from caldrive.perception.network.camera_check import REASONS, WINDOWS, averaged, evidence
 
 CELL = 8  # pixels a side of the cells in which images are compared
 
@@ -66,23 +66,23 @@ class Watchdog:
     def reset(self) -> None:
         """An episode begins."""
         self._stillness = Stillness(self.config)
-        self._evidence: deque[NDArray[np.float32]] = deque(maxlen=WINDOW)
+        self._evidence: deque[NDArray[np.float32]] = deque(maxlen=max(WINDOWS))
         self._unlike = ""  # what is wrong, while the images are unlike the recording's
 
     def look(self, observation: Observation, images: Tensor) -> None:
         """Raises BadImage, with what is wrong, where the camera has failed. images: the observation's, normalised
         (1, 3, H, W)."""
-        faults = (
-            self._stillness.fault(observation),  # both see every frame, whatever the other one says
-            self._unlike_recording(images),
-            _plain(observation.image, self.config.least_spread),
+        faults = (  # each sees every frame, whatever the others say
             _old(observation, self.config.oldest),
+            _plain(observation.image, self.config.least_spread),
+            self._stillness.fault(observation),
+            self._unlike_recording(images),
         )
         if fault := next(filter(None, faults), ""):
             raise BadImage(f"{fault}: brake, and look at the camera")
 
     def _unlike_recording(self, images: Tensor) -> str:
-        """What is wrong with the images of the last second, or nothing."""
+        """What is wrong with the images of the last seconds, or nothing."""
         if self._check is None:
             return ""
         self._evidence.append(evidence(self._check(images))[0].numpy())

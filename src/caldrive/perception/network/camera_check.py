@@ -36,7 +36,9 @@ REASONS: dict[str, tuple[str, ...]] = {
     "blurred": ("blurred",),
     "partly covered": ("half covered", "dirt on the lens"),
 }
-WINDOW = 10  # frames over which the evidence is averaged
+# Frames over which the evidence for each is averaged. On the opposite side of the road a car sees what mirrors show,
+# and it needs some seconds to come back.
+WINDOWS = tuple(60 if name == "mirrored" else 10 for name in REASONS)
 KEY = "camera_check"  # of its thresholds in the header of a network's file
 CHANNELS = (16, 24, 32, 48)
 NODES, DROPOUT = 32, 0.3
@@ -79,9 +81,9 @@ def evidence(outputs: Tensor) -> Tensor:
 
 
 def averaged(odds: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """For each reason the mean (reasons,) of its evidence (T, reasons) over the last WINDOW frames; before the first
-    frame there is no evidence."""
-    return np.asarray(odds[-WINDOW:].sum(axis=0, dtype=np.float64) / WINDOW)
+    """For each reason the mean (reasons,) of its evidence (T, reasons) over the last frames of its window; before the
+    first frame there is no evidence."""
+    return np.array([odds[-window:, k].sum(dtype=np.float64) / window for k, window in enumerate(WINDOWS)])
 
 
 def add_camera_check(path: Path, check: CameraCheck, thresholds: Sequence[float]) -> None:

@@ -20,7 +20,7 @@ from caldrive.perception.dataset.augmentation import augment
 from caldrive.perception.dataset.config import AugmentationConfig
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.network.camera_check import REASONS, WINDOW, CameraCheck, averaged, evidence
+from caldrive.perception.network.camera_check import REASONS, WINDOWS, CameraCheck, averaged, evidence
 from caldrive.progress import Progress, silent
 
 Images = NDArray[np.uint8]
@@ -93,7 +93,7 @@ def _sky(n: int, height: int, generator: Generator) -> Tensor:
 @torch.inference_mode()
 def evidence_thresholds(check: CameraCheck, frames: Frames) -> list[float]:
     """For each reason a threshold above what the check thinks of a working camera: MARGIN more than the largest mean
-    of WINDOW frames in the streams of these frames, which it has not learnt from, as recorded and in other light."""
+    over its window in the streams of these frames, which it has not learnt from, as recorded and in other light."""
     largest = np.zeros(len(REASONS))
     for first in np.unique(frames.stream_start[: len(frames)]):
         images = frames.images(np.flatnonzero(frames.stream_start == first))
@@ -102,6 +102,6 @@ def evidence_thresholds(check: CameraCheck, frames: Frames) -> list[float]:
             shown = _in_other_light(images, group, seed=int(first) * LOOKS + look) if look else images
             parts = torch.split(normalise(to_float(shown)), FRAMES_A_PASS)
             odds = torch.cat([evidence(check(part)) for part in parts]).numpy()
-            means = [averaged(odds[max(0, k - WINDOW) : k]) for k in range(1, len(odds) + 1)]
+            means = [averaged(odds[max(0, k - max(WINDOWS)) : k]) for k in range(1, len(odds) + 1)]
             largest = np.maximum(largest, np.max(means, axis=0))
     return [max(LEAST, MARGIN + float(value)) for value in largest]
