@@ -25,7 +25,8 @@ COMMANDS = {
     "report": "run --out report",
     "collect": "--episodes 2 --duration 1 --workers 1 --out recording",
     "data": "recording --picture labels.png",
-    "train": "--data recording --steps 2 --batch 2 --history-steps 1 --history-batch 2 --camera-check-steps 1 --out training",
+    "train": "--data recording --steps 2 --batch 2 --history-steps 1 --history-batch 2 --camera-check-steps 1 "
+    "--out training",
     "evaluate": "--data recording --model training/model.safetensors --worst worst.png",
     "see": "labels.png --out see.mp4",
     "town": "--town town02 --plan plan.png",
