@@ -15,6 +15,14 @@ def _one_thread() -> None:
     torch.set_num_threads(1)
 
 
+@pytest.fixture(autouse=True)
+def _no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of a tiny training's time would go into its curves, which test_folder.py draws."""
+    monkeypatch.setattr(
+        "caldrive.perception.training.train.draw_curves", lambda rows, path: path.write_bytes(b"curves")
+    )
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three tiny episodes of a bright column."""

@@ -6,8 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from caldrive.perception.network.checkpoint import CheckpointError
+from caldrive.perception.training.folder import draw_curves
 from caldrive.perception.training.train import train
 from tests.perception.data import SHORT, TINY
 
@@ -27,3 +29,11 @@ def test_tensorboard_finds_the_figures(folder: Path, tmp_path: Path) -> None:
     rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
     shown = {one.step: one.value for one in events.Scalars("loss")}
     assert shown == pytest.approx({row["step"]: row["loss"] for row in rows})
+
+
+def test_curves_are_drawn_where_some_steps_were_validated(tmp_path: Path) -> None:
+    rows: list[dict[str, float]] = [{"step": step, "loss": 1 / step} for step in range(1, 61)]
+    rows[-1] |= {"validation/loss": 0.5, "validation/red_light/iou": 0.9}
+    draw_curves(rows, tmp_path / "curves.png")
+    with Image.open(tmp_path / "curves.png") as picture:
+        assert picture.size > (1000, 400)
