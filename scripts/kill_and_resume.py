@@ -24,7 +24,7 @@ from pathlib import Path
 
 from scripts.attack.attempt import fresh, tree
 from scripts.attack.good import written_by_hand
-from scripts.attack.runner import Limits, confine, load_the_program
+from scripts.attack.runner import Limits, confine, leave, load_the_program
 from scripts.small_disk import SmallDisk
 
 WAYS = ("clock", "write", "full")
@@ -172,11 +172,7 @@ class Run:
 
             code = main(work.line.split())
         finally:
-            try:
-                sys.stdout.flush()
-                sys.stderr.flush()
-            finally:
-                os._exit(code)
+            leave(code)
 
     def wait(self, kill_after: float | None = None) -> tuple[int, str]:
         """Waits for its end, or kills it after some seconds; its exit code, and what it said."""

@@ -16,6 +16,7 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 TICK = 0.05  # s between two looks at a child
 GRACE = 3.0  # s that a child's own children have to end after it
@@ -107,11 +108,16 @@ def _be_the_child(arguments: Sequence[str], work: Path, limits: Limits) -> None:
     except BaseException:
         traceback.print_exc()
     finally:
-        try:
-            sys.stdout.flush()
-            sys.stderr.flush()
-        finally:
-            os._exit(code)
+        leave(code)
+
+
+def leave(code: int) -> NoReturn:
+    """Ends a forked child with what it said, and without what its parent wanted done at its own end."""
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(code)
 
 
 def confine(work: Path, beside: Path, limits: Limits) -> None:
