@@ -11,6 +11,7 @@ from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.control.controller import CALController
 from caldrive.control.presets import DEFAULT
 from caldrive.datatypes import Affordances, Control, Observation, Pose, Step, Truth
+from caldrive.driving.own_code import OwnCodeError
 from caldrive.driving.rollout import rollout, run_episode
 from caldrive.results import InfractionKind, Outcome
 from caldrive.scenarios import Scenario
@@ -75,7 +76,7 @@ def test_a_world_whose_clock_stands_still_or_whose_ego_is_nowhere_is_named(spoil
             return replace(truth, **spoilt if "time" in spoilt else {"ego": nowhere})
 
     world = Spoilt()
-    with pytest.raises(ValueError, match=r"found that Spoilt .*correct its (step and its )?truth"):
+    with pytest.raises(OwnCodeError, match=r"found that Spoilt .*correct its (step and its )?truth"):
         run_episode(world, Idle(), replace(SCENARIO, time_limit=5))
 
 

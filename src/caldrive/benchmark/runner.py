@@ -19,8 +19,9 @@ from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, driver_prove
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import SUITES, Trial, suite
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_writable_folder
+from caldrive.driving.own_code import OwnCodeError
 from caldrive.driving.referee import Referee
-from caldrive.driving.rollout import AgentError, run_episode
+from caldrive.driving.rollout import run_episode
 from caldrive.driving.setup import set_up
 from caldrive.files import locked_folder
 from caldrive.interfaces import Agent, World
@@ -49,14 +50,14 @@ def _close_worker(driver: AgentSettings) -> None:
 
 
 def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
-    """What a worker does: drives one trial, and returns all that is kept of it. Raises AgentError with its key."""
+    """What a worker does: drives one trial, and returns all that is kept of it. Raises OwnCodeError with its key."""
     world, agent, provenance = _worker(driver)
     referee = Referee(trial.scenario, trial.fatal)
     metrics, artifacts = EpisodeMetrics(), EpisodeArtifacts(world, referee)
     try:
         result = run_episode(world, agent, trial.scenario, metrics.add, artifacts.add, referee=referee)
-    except AgentError as error:
-        raise AgentError(f"{error} (in episode {trial.key})") from error
+    except OwnCodeError as error:
+        raise OwnCodeError(f"{error} (in episode {trial.key})") from error
     figures = {name: plain(value) for name, value in metrics.compute(result.infractions).items()}
     line = {"key": trial.key, "result": result_values(result), "figures": figures}
     return EpisodeRecord(line=line, files=artifacts.files(trial.key, result), provenance=provenance)
@@ -77,7 +78,7 @@ class RunProgress:
 def benchmark(settings: BenchmarkSettings) -> Iterator[RunProgress]:
     """Drives the trials that a folder lacks; yields how far the run is.
 
-    Raises ValueError where a folder belongs to another run, AgentError where the agent fails, RuntimeError where
+    Raises ValueError where a folder belongs to another run, OwnCodeError where the agent fails, RuntimeError where
     workers keep dying or Ray is missing.
     """
     known = [RunFolder(folder) for folder in settings.known]

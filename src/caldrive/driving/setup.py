@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 from caldrive.agents.registry import agent_entry
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import CameraConfig
+from caldrive.driving.own_code import truth_of
 from caldrive.interfaces import Agent, World
 from caldrive.plugins import find_plugin
 
 WORLDS = ("embedded",)
+LONGEST_STEP = 1.0  # s
 WORLD_METHODS = ("reset", "step", "truth", "close")  # of `interfaces.World`
 
 
@@ -26,14 +29,25 @@ def make_world(name: str = "embedded", camera: CameraConfig | None = None, **mor
         return EmbeddedWorld(camera, **more)
     plugin = find_plugin(name, "world", WORLDS)
     world: World = plugin.build(camera=camera, **more)
+    _check_world(world, plugin.name)
+    return world
+
+
+def _check_world(world: World, name: str) -> None:
+    """Raises ValueError where somebody's object is no world."""
     missing = [method for method in WORLD_METHODS if not callable(getattr(world, method, None))]
     missing += ["dt"] * (getattr(world, "dt", None) is None)
     if missing:
         raise ValueError(
-            f"found that {plugin.name} has no {missing[0]}, wanted a world with dt, {', '.join(WORLD_METHODS)}: add it "
+            f"found that {name} has no {missing[0]}, wanted a world with dt, {', '.join(WORLD_METHODS)}: add it "
             "(caldrive.interfaces.World says what each does)"
         )
-    return world
+    dt: object = world.dt  # it may be anything
+    if not isinstance(dt, Real) or not 0 < float(dt) <= LONGEST_STEP:
+        raise ValueError(
+            f"found that {name} has dt {dt!r}, wanted the seconds of one step, more than 0 and at most "
+            f"{LONGEST_STEP}: set it to 0.1"
+        )
 
 
 def set_up(settings: AgentSettings, world_name: str = "embedded", images: bool = False) -> tuple[World, Agent]:
@@ -46,7 +60,7 @@ def set_up(settings: AgentSettings, world_name: str = "embedded", images: bool =
     camera = entry.camera(settings) or (CameraConfig() if images else None)
     world = make_world(world_name, camera)
     try:
-        return world, entry.make(settings, world.dt, world.truth if entry.privileged else None)
+        return world, entry.make(settings, world.dt, (lambda: truth_of(world)) if entry.privileged else None)
     except BaseException:
         world.close()
         raise

@@ -15,7 +15,7 @@ from caldrive.agents.registry import agent_entry, make_cal
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.control.controller import CALController, ControlConfig
 from caldrive.datatypes import DT, KMH, Affordances, CameraConfig, Command, Observation, Pose, Truth, VehicleState
-from caldrive.driving.rollout import next_step, reset_agent
+from caldrive.driving.own_code import next_step, reset_agent
 from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
 from caldrive.driving.setup import make_world
 from caldrive.interfaces import World, is_recordable
@@ -114,7 +114,7 @@ class AgentTiming:
 def measure_agent(settings: AgentSpeedSettings, progress: Progress = silent) -> AgentTiming:
     """Run an agent on images of noise: how long it takes does not depend on what they show.
 
-    Raises AgentError where the agent fails, ValueError or FileNotFoundError where it cannot be made.
+    Raises OwnCodeError where the agent fails, ValueError or FileNotFoundError where it cannot be made.
     """
     require_within("--steps", settings.steps, 1, MAX_STEPS, 300)
     threads = os.cpu_count() or 1 if settings.threads is None else settings.threads
