@@ -10,6 +10,7 @@ import pytest
 from caldrive.cli import main
 from caldrive.commands import VERBS
 from caldrive.progress import readable_width
+from tests.command_line import refusal
 
 
 def helped(verb: str, capsys: pytest.CaptureFixture[str]) -> str:
@@ -77,3 +78,10 @@ def test_settings_are_asked_for_only_of_verbs_that_take_them(capsys: pytest.Capt
         assert "--config" in capsys.readouterr().err
     assert main(["drive", "--config", ""]) == 2
     assert "found no file . that can be read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"), [("\x1b[31mred", r"\x1b[31mred"), ("\udcff", r"\udcff")], ids=["a colour", "a byte"]
+)
+def test_letters_that_nobody_can_print_are_spelt_out(name: str, shown: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert f"{shown}.toml" in refusal(capsys, "drive", "--config", f"{name}.toml")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 from enum import Enum
@@ -11,6 +12,7 @@ from scripts.attack.attempt import Attempt
 from scripts.attack.outputs import NO_NUMBER, Files, impossible, leaves, leftovers, strict_json, torn
 from scripts.attack.runner import CRASHED, Ended
 
+PROGRESS = re.compile(r" \(\d+%\)$")  # how far it has come, in a line now and then
 LONGEST = 4000  # letters of a sentence, as it may name what was typed
 
 
@@ -79,7 +81,7 @@ def _left(ended: Ended, work: Path, before: Files) -> Verdict | None:
 
 def _no_sentence(ended: Ended, as_json: bool) -> str:
     """How a refusal is not one sentence, for people and, where JSON was asked for, for programs."""
-    lines = [line for line in ended.stderr.split("\n") if line.strip()]
+    lines = [line for line in ended.stderr.split("\n") if line.strip() and not PROGRESS.search(line)]
     if len(lines) != 1 or not lines[0].startswith("caldrive: "):
         return f"{len(lines)} lines on stderr"
     if not lines[0].isprintable():

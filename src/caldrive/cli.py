@@ -64,7 +64,9 @@ def _answered(answer: Answer, as_json: bool) -> int:
 
 
 def _failed(sentence: str, as_json: bool) -> int:
-    """Says what went wrong, to people and, where JSON was asked for, to programs."""
+    """Says what went wrong, to people and, where JSON was asked for, to programs. Names of files and what stands in
+    them may hold letters that change a terminal's colours, or that nobody can print."""
+    sentence = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in sentence)
     _say(f"caldrive: {sentence}")
     if as_json:
         print(json.dumps({"error": sentence}))

@@ -149,6 +149,10 @@ NONSENSE = {
     "too much throttle": ("return Control(throttle=1.5)", "ValueError: throttle is 1.5, but must lie in [0, 1]"),
     "a steering angle that is no number": ("return Control(steer=float('nan'))", "ValueError: steer is nan"),
     "an error": ("return 1 / observation.time", "at step 0 (0.0 s) (ZeroDivisionError: float division by zero, own"),
+    "an error that is none of Python's usual ones": (
+        "raise GeneratorExit",
+        "failed at step 0 (0.0 s) (GeneratorExit: , own",
+    ),
     "an end of the program": ("raise SystemExit(0)", "Own failed at step 0 (0.0 s) (SystemExit: 0, own"),
     "an error later on": ("return 3 if observation.time > 0.25 else Control()", "returned 3 at step 3 (0.3 s), wanted"),
     "a decision that is none": (

@@ -24,6 +24,7 @@ SENTENCE = "caldrive: found 3, wanted 4: type --cars 4\n"
         (RAN, Outcome.RAN),
         (Ended(1, "", 1, 1, "not equal", ""), Outcome.RAN),
         (Ended(2, "", 1, 1, "", SENTENCE), Outcome.REFUSED),
+        (Ended(2, "", 1, 1, "", "pictures (20%)\n" + SENTENCE), Outcome.REFUSED),
         (Ended(2, "", 1, 1, "", 2 * SENTENCE), Outcome.UGLY),
         (Ended(2, "", 1, 1, "", SENTENCE.replace("3", "\x1b[31m")), Outcome.UGLY),
         (Ended(2, "", 1, 1, "half an answer", SENTENCE), Outcome.UGLY),

@@ -91,9 +91,9 @@ def _call(owner: Agent | World, method: Callable[..., Any], *arguments: Any, at:
     """What a method of somebody's agent or world returns. Raises OwnCodeError for any of its errors."""
     try:
         return method(*arguments)
-    except OwnCodeError:  # a world's, which an agent that knows the truth came upon
+    except (OwnCodeError, KeyboardInterrupt):  # a world's, which an agent that knows the truth came upon; and Ctrl-C
         raise
-    except (Exception, SystemExit) as error:  # it may be anybody's code, and it does not end the program
+    except BaseException as error:  # it may be anybody's code, and it does not end the program
         if os.environ.get("CALDRIVE_TRACEBACK") or _is_our_world(owner):
             raise
         raise OwnCodeError(f"found that {_name(owner)} failed {at} ({described(error)}): correct its code") from error
