@@ -15,6 +15,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -37,14 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     done = {row.number for row in rows(out)}
     todo = [number for number in range(options.inputs) if number not in done]
     lanes = [_lane(todo[k :: options.lanes], attempts, out, began + 60 * options.minutes) for k in range(options.lanes)]
-    for lane in lanes:
-        os.waitpid(lane, 0)
+    broken = sum(os.waitpid(lane, 0)[1] != 0 for lane in lanes)
     found, minutes = rows(out), (time.monotonic() - began) / 60
     new = sum(row.number not in done for row in found)
     print(summary(found, minutes * len(found) / max(1, new)))
     bad = list(faults(found))
     (out / SUMMARY).write_text(json.dumps([asdict(row) for row in bad], indent=1) + "\n")
-    return int(bool(bad))
+    return int(bool(bad or broken))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,6 +71,8 @@ def _lane(numbers: list[int], attempts: Attempts, out: Path, until: float) -> in
                 break
             _say(take(number, attempts[number], out, Limits()))
         code = 0
+    except BaseException:
+        traceback.print_exc()  # nobody else would hear of it
     finally:
         sys.stdout.flush()
         os._exit(code)

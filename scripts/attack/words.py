@@ -57,10 +57,11 @@ class Option:
 def random_words(rng: random.Random, good: dict[str, bytes]) -> Attempt:
     """A command line that ends well, and one or two options with values that mostly cannot be."""
     use = rng.choice(BASES)
-    chosen = rng.sample(options(use.line), rng.choice((1, 1, 1, 2)))
+    known = options(use.line)
+    chosen = rng.sample(known, min(len(known), rng.choice((1, 1, 1, 2))))
     words, bad = list(use.arguments), ""
     for option in chosen:
-        word = rng.choice([word for word in _words(option, rng) if word not in SLOW.get(option.name, ())])
+        word = rng.choice([word for word in _words(option, rng) if word not in SLOW.get(option.name, ())] or TEXTS)
         bad = bad or why_bad(option, word)
         words += [f"{option.name}={word}"] if rng.random() < 0.3 else [option.name, word]
     return Attempt(KIND, tuple(word for word in words if "\0" not in word), needed(use, good), bad)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from caldrive.agents.cal import CALAgent
-from caldrive.agents.registry import SHIPPED_MODEL
+from caldrive.agents.registry import SHIPPED_MODEL, agent_entry
 from caldrive.agents.settings import AgentSettings
 from caldrive.driving.setup import set_up
 from caldrive.driving.tasks import task_scenarios
@@ -46,3 +46,11 @@ def test_a_network_that_would_take_many_times_as_long_does_not_drive(tmp_path: P
     save_network(tmp_path / "slow.safetensors", network, replace(info, ranges=()), half=True)
     with pytest.raises(ValueError, match=r"found no ranges for 8-bit integers in .*slow\.safetensors"):
         set_up(AgentSettings(model=tmp_path / "slow.safetensors"))
+
+
+def test_a_model_for_the_oracle_is_refused_before_anything_is_driven() -> None:
+    settings = AgentSettings(agent="oracle", model=Path("none.safetensors"))
+    with pytest.raises(ValueError, match=r"found --model none\.safetensors, but the oracle knows the truth"):
+        agent_entry("oracle").provenance(settings)
+    with pytest.raises(ValueError, match=r"found --model none\.safetensors, but the oracle knows the truth"):
+        set_up(settings)

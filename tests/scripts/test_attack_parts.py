@@ -132,6 +132,12 @@ def test_the_options_of_a_verb_are_those_of_its_help() -> None:
     assert Option("--command", "{left,straight,right}") in words.options("see pictures")
 
 
+def test_a_verb_with_one_option_gets_no_two() -> None:
+    good = written_by_hand()
+    drawn = [words.random_words(random.Random(k), good) for k in range(300)]
+    assert {attempt.arguments[0] for attempt in drawn} == {use.arguments[0] for use in words.BASES}
+
+
 def test_a_number_and_a_seed_give_the_same_attempt() -> None:
     kinds, good = ("suite", "map", "own code"), written_by_hand()
     one, again, other = (Attempts(seed, good, kinds) for seed in (1, 1, 2))

@@ -84,15 +84,26 @@ def _cal_provenance(settings: AgentSettings) -> dict[str, Any]:
 def _make_oracle(settings: AgentSettings, dt: float, truth: TruthSource | None) -> CALAgent:
     from caldrive.agents.cal import CALAgent, OraclePerception
 
+    _oracle_provenance(settings)
     assert truth is not None
     return CALAgent(OraclePerception(truth), make_controller(settings.controller, settings.cap, dt))
+
+
+def _oracle_provenance(settings: AgentSettings) -> dict[str, Any]:
+    """Nothing. Raises ValueError where the settings name a model, which it would never see."""
+    if settings.model is not None:
+        raise ValueError(
+            f"found --model {settings.model}, but the oracle knows the truth and takes none: leave --model out, or "
+            "type --agent cal"
+        )
+    return {}
 
 
 AGENTS: dict[str, AgentEntry] = {
     "cal": AgentEntry(
         make=lambda settings, dt, _: make_cal(settings, dt), camera=_cal_camera, provenance=_cal_provenance
     ),
-    "oracle": AgentEntry(make=_make_oracle, camera=lambda _: None, provenance=lambda _: {}, privileged=True),
+    "oracle": AgentEntry(make=_make_oracle, camera=lambda _: None, provenance=_oracle_provenance, privileged=True),
 }
 
 

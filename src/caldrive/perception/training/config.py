@@ -88,7 +88,7 @@ class TrainingConfig:
     history from the first step."""
     history_batch: int = 256
     """Windows with their history in a step of the second stage."""
-    camera_check_steps: int = 3_000
+    camera_check_steps: int = 5_000
     """Steps of the third stage, in which the camera check learns what a working camera's images look like; no more than
     --steps. 0 leaves it out."""
     backbone_chunk: int = 0

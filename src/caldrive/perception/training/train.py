@@ -10,6 +10,8 @@ from contextlib import closing, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
+
 from caldrive.files import locked_folder
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.dataset.sampler import data_summary
@@ -150,7 +152,8 @@ def validate(run: TrainingRun, validation: Frames, model: Path, context: int) ->
     network = calibrated(run.network, data["train_classes"]).eval()
     round_to_half(network)
     metrics = evaluate(network, validation, config.precision, run.group.device, context)
-    images = normalise(to_float(sampler.frames.images(sampler.draw(0, RANGE_FRAMES))))
+    drawn = np.unique(sampler.draw(0, RANGE_FRAMES))  # of a small recording the same ones come again and again
+    images = normalise(to_float(sampler.frames.images(drawn)))
     ranges = input_ranges(network.backbone, images.to(run.group.device))
     files = {"initial": config.initial and Path(config.initial).name, "imagenet": Path(config.imagenet).name}
     training = asdict(config) | files  # not whose folders
