@@ -75,6 +75,13 @@ def somebody_elses_code(sentence: str) -> Iterator[None]:
         raise ValueError(sentence.replace("{}", described(error))) from error
 
 
+def attribute(thing: object, name: str, otherwise: Any = None) -> Any:
+    """An attribute of somebody's object, which may be computed by somebody's code. Raises ValueError where that
+    fails."""
+    with somebody_elses_code(f"found that {type(thing).__name__} fails when asked for {name} ({{}}): correct its code"):
+        return getattr(thing, name, otherwise)
+
+
 def is_plugin(text: str) -> bool:
     """Whether a text names a class rather than something registered."""
     return ":" in text

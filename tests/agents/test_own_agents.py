@@ -207,6 +207,7 @@ def test_nonsense_in_a_benchmarks_worker_names_the_episode(
             "def act(self, observation): pass\ndef reset(self): raise KeyError('x')",
             "failed at its reset (KeyError: 'x'",
         ),
+        ("def __getattr__(self, name): raise RuntimeError(name)", "Own fails when asked for act (RuntimeError: act"),
     ],
 )
 def test_a_class_that_is_no_agent_is_named(

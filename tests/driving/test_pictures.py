@@ -111,6 +111,9 @@ def test_damaged_pictures_and_videos_are_named(tmp_path: Path) -> None:
         list(open_source(tmp_path / "bad.png"))
     with pytest.raises(ValueError, match=r"short.mp4 cannot be read as a video"):
         list(open_source(tmp_path / "short.mp4"))
+    (tmp_path / "unknown.mp4").write_bytes(content.replace(b"minf", b"mknf"))  # the part that names the format
+    with pytest.raises(ValueError, match=r"found no pictures in .*unknown.mp4 that can be read"):
+        open_source(tmp_path / "unknown.mp4")
 
 
 @pytest.mark.parametrize("side", [12_000, 60_000])

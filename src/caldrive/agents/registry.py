@@ -17,7 +17,7 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
 from caldrive.datatypes import CameraConfig
 from caldrive.interfaces import Agent, TruthSource
-from caldrive.plugins import Plugin, find_plugin
+from caldrive.plugins import Plugin, attribute, find_plugin
 from caldrive.provenance import file_digest
 
 if TYPE_CHECKING:  # the command line's help waits for neither torch nor SUMO
@@ -123,7 +123,7 @@ def _plugin_entry(plugin: Plugin) -> AgentEntry:
         if plugin.takes("controller"):
             options["controller"] = make_controller(settings.controller, settings.cap, dt)
         agent: Agent = plugin.build(**options)
-        if not callable(getattr(agent, "act", None)):
+        if not callable(attribute(agent, "act")):
             raise ValueError(
                 f"found that {plugin.name} has no method act, wanted act(observation) that returns a Control: add it"
             )
@@ -139,7 +139,7 @@ def _plugin_entry(plugin: Plugin) -> AgentEntry:
 
 def _plugin_camera(plugin: Plugin) -> CameraConfig | None:
     """The camera that a class asks for; without an attribute `camera` the usual one. Raises ValueError for nonsense."""
-    camera = getattr(plugin.make, "camera", CameraConfig())
+    camera = attribute(plugin.make, "camera", CameraConfig())
     if not isinstance(camera, CameraConfig | None):
         raise ValueError(
             f"found that {plugin.name} has camera {camera!r}, wanted a CameraConfig or None: "

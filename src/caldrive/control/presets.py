@@ -39,7 +39,7 @@ from caldrive.control.longitudinal import LongitudinalConfig
 from caldrive.control.patience import PatienceConfig
 from caldrive.control.pid import PIDGains
 from caldrive.interfaces import Controller
-from caldrive.plugins import find_plugin
+from caldrive.plugins import attribute, find_plugin
 from caldrive.provenance import file_digest
 
 DEFAULT = ControlConfig()
@@ -92,7 +92,7 @@ def make_controller(name: str, cap: float | None, dt: float) -> Controller:
         return CALController(controller_config(name, cap), dt)
     plugin = find_plugin(name, "controller", KNOWN)
     controller: Controller = plugin.build(cap=cap, dt=dt)
-    if not callable(getattr(controller, "step", None)):
+    if not callable(attribute(controller, "step")):
         raise ValueError(
             f"found that {plugin.name} has no method step, wanted step(affordances, speed, command) that returns a "
             "Decision: add it"

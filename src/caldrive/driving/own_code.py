@@ -35,7 +35,7 @@ class OwnCodeError(RuntimeError):
 
 def reset_agent(agent: Agent) -> None:
     """Start an episode. An agent without a method reset has nothing to forget. Raises OwnCodeError where it fails."""
-    if (reset := getattr(agent, "reset", None)) is not None:
+    if (reset := _call(agent, getattr, agent, "reset", None, at="at its reset")) is not None:
         _call(agent, reset, at="at its reset")
 
 
@@ -51,7 +51,7 @@ def next_step(agent: Agent, observation: Observation, number: int) -> tuple[Cont
             f"found that {_name(agent)} returned {control!r} {at}, wanted a Control: "
             "return caldrive.Control(throttle, brake, steer)"
         )
-    decision = getattr(agent, "decision", None)
+    decision = _call(agent, getattr, agent, "decision", None, at=at)
     if decision is not None:
         _check_decision(agent, decision, at)
     # A network's numbers are often those of NumPy or torch, in 32 bits; the world reckons with Python's.

@@ -96,9 +96,9 @@ class VideoFile:
     def __init__(self, path: Path, every: int = 1) -> None:
         self.path, self.name, self.every = path, path.name, every
         with self._opened() as container:
-            if not container.streams.video:
-                raise ValueError(f"found no pictures in {path}, wanted a video: give another file")
-            stream = container.streams.video[0]
+            stream = container.streams.video[0] if container.streams.video else None
+            if stream is None or stream.codec_context is None:  # pictures in a format that nobody knows
+                raise ValueError(f"found no pictures in {path} that can be read, wanted a video: give another file")
             require_picture_size(str(path), stream.width, stream.height)
             self.rate = float(stream.average_rate or stream.guessed_rate or USUAL_RATE)
             self.count = stream.frames or None

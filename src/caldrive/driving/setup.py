@@ -10,7 +10,7 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import CameraConfig
 from caldrive.driving.own_code import truth_of
 from caldrive.interfaces import Agent, World
-from caldrive.plugins import find_plugin
+from caldrive.plugins import attribute, find_plugin
 
 WORLDS = ("embedded",)
 LONGEST_STEP = 1.0  # s
@@ -35,8 +35,8 @@ def make_world(name: str = "embedded", camera: CameraConfig | None = None, **mor
 
 def _check_world(world: World, name: str) -> None:
     """Raises ValueError where somebody's object is no world."""
-    missing = [method for method in WORLD_METHODS if not callable(getattr(world, method, None))]
-    missing += ["dt"] * (getattr(world, "dt", None) is None)
+    missing = [method for method in WORLD_METHODS if not callable(attribute(world, method))]
+    missing += ["dt"] * (attribute(world, "dt") is None)
     if missing:
         raise ValueError(
             f"found that {name} has no {missing[0]}, wanted a world with dt, {', '.join(WORLD_METHODS)}: add it "

@@ -23,7 +23,7 @@ from tests.perception.data import HEIGHT, HISTORY, SHORT, TINY, WIDTH, record
 def test_learns_where_the_column_stands(folder: Path, tmp_path: Path) -> None:
     config = replace(
         SHORT,
-        steps=200,
+        steps=140,
         batch=6,
         learning_rate=2e-3,
         save_every=1000,
