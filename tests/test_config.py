@@ -79,3 +79,12 @@ def test_what_cannot_be_is_named_with_its_place(text: str, message: str, tmp_pat
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"found no file .*gone\.toml"):
         from_toml(tmp_path / "gone.toml", PRESETS, Car())
+
+
+def test_a_file_without_end_and_a_huge_one_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="found no file /dev/zero"):
+        from_toml(Path("/dev/zero"), PRESETS, Car())
+    with (tmp_path / "huge.toml").open("wb") as file:
+        file.truncate(20_000_000)
+    with pytest.raises(ValueError, match=r"found 20 MB in .*huge\.toml"):
+        from_toml(tmp_path / "huge.toml", PRESETS, Car())

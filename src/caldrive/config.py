@@ -12,6 +12,7 @@ from typing import Any, TypeVar, get_type_hints
 import msgspec
 
 T = TypeVar("T")
+MOST_BYTES = 10**7  # of a file of settings
 
 
 def from_toml(path: Path, presets: Mapping[str, T], default: T) -> T:
@@ -21,7 +22,7 @@ def from_toml(path: Path, presets: Mapping[str, T], default: T) -> T:
     Raises ValueError with the file, the key and what could stand there.
     """
     try:
-        values = tomllib.loads(path.read_text())
+        values = tomllib.loads(_text(path))
     except OSError as error:
         raise ValueError(f"found no file {path} that can be read, wanted settings in TOML: give another") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -30,6 +31,19 @@ def from_toml(path: Path, presets: Mapping[str, T], default: T) -> T:
     if name is not None and name not in presets:
         raise ValueError(f"found preset {name!r} in {path}, wanted one of {', '.join(presets)}: correct the name")
     return overlaid(default if name is None else presets[name], values, str(path))
+
+
+def _text(path: Path) -> str:
+    """A file's text. Raises OSError where there is none, such as for a device without end, ValueError for a large
+    one."""
+    if not path.is_file():
+        raise FileNotFoundError(path)
+    if (size := path.stat().st_size) > MOST_BYTES:
+        raise ValueError(
+            f"found {size / 1e6:.0f} MB in {path}, wanted settings in TOML of {MOST_BYTES / 1e6:.0f} MB at most: "
+            "give another"
+        )
+    return path.read_text()
 
 
 def overlaid(defaults: T, values: Mapping[str, Any], where: str) -> T:
