@@ -159,6 +159,10 @@ NONSENSE = {
         "self.decision = 'fast'\nreturn Control()",
         "is 'fast' at step 0 (0.0 s), wanted a Dec",
     ),
+    "a decision without a control": (
+        "self.decision = Decision(None)\nreturn Control()",
+        "has control None at step 0 (0.0 s), wanted a Control",
+    ),
     "a state that is no text": (
         "self.decision = Decision(Control(), state=3)\nreturn Control()",
         "has state 3 at step 0",

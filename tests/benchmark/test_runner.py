@@ -293,7 +293,7 @@ def packed(columns: dict[str, Any]) -> bytes:
 SPOILT = [
     b"garbage", gzip.compress(b"{"), gzip.compress(b'{"trace": 3}'), packed({}), packed(trace() | {"x": [1.0]}),
     packed(trace(0)), packed(trace(time="noon")), packed(trace(time=-1.0)), packed(trace(predicted_red_light="much")),
-    packed(trace(command=3)),
+    packed(trace(command=3)), packed(trace(throttle=2.0)), packed(trace(steer=-1.5)), packed(trace(brake="hard")),
 ]  # fmt: skip
 
 

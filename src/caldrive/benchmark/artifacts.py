@@ -4,6 +4,7 @@ trace, and a still picture of each infraction and of an end without the goal."""
 from __future__ import annotations
 
 import gzip
+import math
 import zlib
 from collections.abc import Iterable
 from dataclasses import replace
@@ -27,6 +28,7 @@ KINDS: dict[str, Any] = {  # of the columns of a trace; the others hold numbers,
     **dict.fromkeys(("time", "x", "y", "speed", "route_done"), list[float]), "command": list[str],
     "state": list[str | None],
 }  # fmt: skip
+LIMITS = {"time": (0.0, math.inf), "throttle": (0.0, 1.0), "brake": (0.0, 1.0), "steer": (-1.0, 1.0)}
 
 
 class EpisodeArtifacts:
@@ -108,5 +110,7 @@ def _check_columns(columns: dict[str, list[Any]]) -> None:
         raise ValueError("its columns are empty or of different lengths")
     for name in COLUMNS:
         as_type(columns[name], KINDS.get(name, list[float | bool | None]))
-    if min(columns["time"]) < 0:
-        raise ValueError("its time is negative")
+    for name, (low, high) in LIMITS.items():
+        for value in as_type(columns.get(name, []), list[float | None]):
+            if value is not None and not low <= value <= high:
+                raise ValueError(f"its {name} is {value}, where {low} to {high} is possible")

@@ -18,8 +18,7 @@ from caldrive.scenarios import Scenario
 
 # The types of fields that films, traces and the referee need.
 DECISION_TYPES: dict[str, type] = {
-    "control": Control, "affordances": Affordances, "state": str, "speed_limit": Real, "target_speed": Real,
-    "note": str,
+    "affordances": Affordances, "state": str, "speed_limit": Real, "target_speed": Real, "note": str,
 }  # fmt: skip
 OBSERVATION_TYPES: dict[str, type] = {"time": Real, "speed": Real, "command": Command}
 TRUTH_TYPES: dict[str, type] = {
@@ -122,6 +121,7 @@ def _check_decision(agent: Agent, decision: Any, at: str) -> None:
             f"found that the decision of {_name(agent)} is {decision!r} {at}, wanted a Decision or None: "
             "set it to caldrive.Decision(control, ...)"
         )
+    _check_fields(f"the decision of {_name(agent)}", decision, {"control": Control}, f" {at}")
     given = {name: kind for name, kind in DECISION_TYPES.items() if getattr(decision, name) is not None}
     _check_fields(f"the decision of {_name(agent)}", decision, given, f" {at}", " or None")
     for spec in SPECS if decision.affordances is not None else ():
