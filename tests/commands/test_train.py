@@ -93,6 +93,7 @@ def test_a_file_holds_the_same_settings_and_the_command_line_goes_before_it(tmp_
         (("--batch", "0"), "found --batch 0, wanted 1 to 100000: type --batch 64"),
         (("--balance", "2"), "type --balance 0.5"),
         (("--recolour.patches", "-1"), "found --recolour.patches -1, wanted 0 or more: type --recolour.patches 12"),
+        (("--loss-weights.red-light", "-1"), "wanted 0.0 or more: type --loss-weights.red-light 1.0"),
         (("--augmentation.rare-share", "1.5"), "wanted 0 to 1.0: type --augmentation.rare-share 0.2"),
         (("--initial", "a.safetensors", "--imagenet", "b.pth"), "wanted one network to begin with"),
         (("--initial", "gone.safetensors"), "found no file gone.safetensors, wanted a network"),

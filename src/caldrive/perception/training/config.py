@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -29,6 +30,10 @@ class LossWeights:
     """Weight of the loss of the distance to the centre line."""
     segmentation: float = 0.5
     """Weight of the auxiliary segmentation's loss, where the recording has semantic images; 0 leaves it out."""
+
+    def __post_init__(self) -> None:
+        """Raises ValueError where a weight would reward mistakes."""
+        require_limits(vars(self), dict.fromkeys(vars(self), (0.0, math.inf)), vars(type(self)), "loss-weights")
 
 
 HISTORY_SHARE = 3 / 14  # of the steps, in which the temporal blocks learn alone
