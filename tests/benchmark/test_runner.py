@@ -6,15 +6,18 @@ import gzip
 import json
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import simplejpeg
 
 from caldrive.benchmark import run_folder
-from caldrive.benchmark.artifacts import read_trace, still_paths, trace_path
+from caldrive.benchmark.artifacts import read_still, read_trace, still_paths, trace_path
 from caldrive.benchmark.replay import replay
 from caldrive.benchmark.result_lines import read_lines
 from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, suite_digest, trial_result
@@ -303,6 +306,16 @@ def test_a_damaged_trace_is_named(content: bytes, tmp_path: Path) -> None:
     trace_path(tmp_path, "a").write_bytes(content)
     with pytest.raises(ValueError, match=r"damaged trace .*a\.json\.gz"):
         read_trace(tmp_path, "a")
+
+
+@pytest.mark.parametrize("spoil", [lambda jpeg: b"", lambda jpeg: jpeg[: len(jpeg) // 2], lambda jpeg: jpeg[50:]])
+def test_a_damaged_still_is_named(spoil: Callable[[bytes], bytes], tmp_path: Path) -> None:
+    jpeg = simplejpeg.encode_jpeg(np.random.default_rng(0).integers(0, 255, (24, 48, 3), np.uint8))
+    (tmp_path / "a-0.jpg").write_bytes(jpeg)
+    assert read_still(tmp_path / "a-0.jpg") == jpeg
+    (tmp_path / "a-0.jpg").write_bytes(spoil(jpeg))
+    with pytest.raises(ValueError, match=r"found a damaged still .*a-0\.jpg .*remove it"):
+        read_still(tmp_path / "a-0.jpg")
 
 
 def test_the_description_says_what_drove(whole: BenchmarkSettings) -> None:

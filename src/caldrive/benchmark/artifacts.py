@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import simplejpeg
 
+from caldrive.checks import require_picture_size
 from caldrive.datatypes import CameraConfig, Image, Step
 from caldrive.driving.referee import Referee
 from caldrive.driving.trace import COLUMNS, Trace, episode_json
@@ -80,6 +81,18 @@ def trace_path(folder: Path, key: str) -> Path:
 def still_paths(folder: Path, key: str) -> list[Path]:
     """A trial's stills, in the order of its infractions; the last one may be its end."""
     return sorted((folder / "stills").glob(f"{key}-[0-9].jpg"))
+
+
+def read_still(path: Path) -> bytes:
+    """A still as JPEG. Raises ValueError where it is damaged."""
+    content = path.read_bytes()
+    try:
+        height, width, *_ = simplejpeg.decode_jpeg_header(content)
+        require_picture_size(str(path), width, height)
+        simplejpeg.decode_jpeg(content, strict=True)
+        return content
+    except ValueError as error:
+        raise ValueError(f"found a damaged still {path} ({error}): remove it, then it is done without") from error
 
 
 def read_trace(folder: Path, key: str) -> dict[str, list[Any]] | None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from caldrive.benchmark.artifacts import artifact_files, read_trace_file, still_paths, trace_path
+from caldrive.benchmark.artifacts import artifact_files, read_still, read_trace_file, still_paths, trace_path
 from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder
 from caldrive.benchmark.suites import Trial
 from caldrive.files import json_line
@@ -68,4 +68,4 @@ def _files(folder: Path, line: dict[str, Any], trial: Trial) -> dict[str, bytes]
     """The episode's trace and stills under their new names."""
     key = line["key"]
     values = read_trace_file(trace_path(folder, key)) | {"result": _with_task(line["result"], trial)}
-    return artifact_files(trial.key, json_line(values), [path.read_bytes() for path in still_paths(folder, key)])
+    return artifact_files(trial.key, json_line(values), [read_still(path) for path in still_paths(folder, key)])

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from caldrive.benchmark.artifacts import still_paths
+from caldrive.benchmark.artifacts import read_still, still_paths
 from caldrive.benchmark.metrics import succeeded
 from caldrive.benchmark.report.figures import errors_figure, map_figure, speed_figure, success_figure
 from caldrive.benchmark.report.runs import BenchmarkRun, Failure, failures
@@ -125,7 +125,7 @@ def _card(failure: Failure, stills: Sequence[Path]) -> str:
 
 def _data_address(path: Path) -> str:
     """A JPEG file inside the page."""
-    return f"data:image/jpeg;base64,{base64.b64encode(path.read_bytes()).decode()}"
+    return f"data:image/jpeg;base64,{base64.b64encode(read_still(path)).decode()}"
 
 
 def report_text(runs: Sequence[BenchmarkRun]) -> str:
