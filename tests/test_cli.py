@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from pathlib import Path
 
 import pytest
 
@@ -85,3 +86,10 @@ def test_settings_are_asked_for_only_of_verbs_that_take_them(capsys: pytest.Capt
 )
 def test_letters_that_nobody_can_print_are_spelt_out(name: str, shown: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert f"{shown}.toml" in refusal(capsys, "drive", "--config", f"{name}.toml")
+
+
+def test_a_word_without_end_is_cut_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "drive.toml").write_text(f'controller = "{5000 * "x"}"')
+    said = refusal(capsys, "drive", "--config", str(tmp_path / "drive.toml"), "--agent", "oracle")
+    assert "xxx..." in said
+    assert len(said) < 1500

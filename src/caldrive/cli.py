@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -31,6 +32,7 @@ DESCRIPTION = (
 )
 FULL = (errno.ENOSPC, errno.EDQUOT)
 FAILED, STOPPED = 2, 130  # exit codes
+LONGEST_WORD = 1000  # letters of it that an error shows
 STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)  # --json and no --no-json; --cap 20 and no --cap None
 
 
@@ -64,8 +66,9 @@ def _answered(answer: Answer, as_json: bool) -> int:
 
 
 def _failed(sentence: str, as_json: bool) -> int:
-    """Says what went wrong, to people and, where JSON was asked for, to programs. Names of files and what stands in
-    them may hold letters that change a terminal's colours, or that nobody can print."""
+    """Says what went wrong, to people and, where JSON was asked for, to programs. What stands in a file may have no
+    end, and letters that change a terminal's colours, or that nobody can print."""
+    sentence = re.sub(rf"(\S{{{LONGEST_WORD}}})\S+", r"\1...", sentence)
     sentence = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in sentence)
     _say(f"caldrive: {sentence}")
     if as_json:
