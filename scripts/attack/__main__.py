@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -84,8 +85,11 @@ def _say(row: Row) -> None:
 
 
 def _replay(folder: Path) -> int:
-    with tempfile.TemporaryDirectory() as name:
-        ended, found = tried(kept(folder), Path(name).resolve(), Limits())
+    work = Path(tempfile.mkdtemp()).resolve()  # a TemporaryDirectory would be removed by the child, too, at its end
+    try:
+        ended, found = tried(kept(folder), work, Limits())
+    finally:
+        shutil.rmtree(work)
     print(ended.stdout + ended.stderr)
     print(f"{found.outcome.value} {found.why}, exit code {ended.code}, {ended.seconds:.1f} s")
     return int(found.outcome.fault)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from scripts.attack import campaign
-from scripts.attack.attempt import Attempt
+from scripts.attack.attempt import Attempt, keep
 from scripts.attack.runner import Ended
 from scripts.attack.verdicts import Outcome, verdict
 from tests.documentation import ROOT
@@ -99,3 +99,12 @@ def test_the_table_counts_kinds_and_outcomes(tmp_path: Path) -> None:
     assert [line.split() for line in text.splitlines()[1:3]] == [["suite", "2", "1"], ["all", "2", "1"]]
     assert text.splitlines()[3] == "3 inputs, 0.50 s of a processor each, 180 an hour"
     assert [row.number for row in campaign.faults(rows)] == [2]
+
+
+def test_an_attempt_that_was_kept_is_tried_again(tmp_path: Path) -> None:
+    keep(Attempt("command line", ("town", "--width", "-5")), tmp_path, {})
+    command = [sys.executable, "-m", "scripts.attack", "--replay", str(tmp_path)]
+    found = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert found.returncode == 0, found
+    assert "found --width -5" in found.stdout
+    assert "refused in one sentence , exit code 2" in found.stdout
