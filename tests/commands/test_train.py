@@ -90,6 +90,7 @@ def test_a_file_holds_the_same_settings_and_the_command_line_goes_before_it(tmp_
         (("--network.width", "-1"), "found a network of width -1.0"),
         (("--preset", "huge"), "wanted one of small, paper: type --preset small"),
         (("--steps", "2", "--history-steps", "2"), "found --history-steps 2, wanted 0 to 1: type --history-steps 0"),
+        (("--cache-gb", "-1"), "found --cache-gb -1.0, wanted 0.0 or more"),
         (("--batch", "0"), "found --batch 0, wanted 1 to 100000: type --batch 64"),
         (("--balance", "2"), "type --balance 0.5"),
         (("--recolour.patches", "-1"), "found --recolour.patches -1, wanted 0 or more: type --recolour.patches 12"),

@@ -52,6 +52,7 @@ LIMITS: Limits = {
     "history_batch": (1, 100_000),
     "camera_check_steps": (0, 10_000_000),
     "backbone_chunk": (0, 1_000_000),
+    "cache_gb": (0.0, math.inf),
     "validation_share": (0.0, 1.0),
     "evaluate_every": (1, 10_000_000),
     "save_every": (1, 10_000_000),
