@@ -93,3 +93,9 @@ def test_a_word_without_end_is_cut_off(tmp_path: Path, capsys: pytest.CaptureFix
     said = refusal(capsys, "drive", "--config", str(tmp_path / "drive.toml"), "--agent", "oracle")
     assert "xxx..." in said
     assert len(said) < 1500
+
+
+def test_of_an_option_that_is_there_twice_the_last_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "drive.toml").write_text("cap = 20.0")
+    said = refusal(capsys, "drive", "--config", str(tmp_path / "drive.toml"), "--config", "gone.toml")
+    assert "found no file gone.toml" in said

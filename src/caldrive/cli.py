@@ -110,13 +110,14 @@ def _defaults(verb: str, arguments: Sequence[str]) -> Any:
 
 
 def _value(arguments: Sequence[str], option: str) -> str | None:
-    """What stands behind an option, if it is there."""
+    """What stands behind an option, if it is there; where it is there twice, the last counts, as for all options."""
+    found = None
     for word, following in zip(arguments, [*arguments[1:], None], strict=True):
         if word == option:
-            return following
-        if word.startswith(f"{option}="):
-            return word.partition("=")[2]
-    return None
+            found = following
+        elif word.startswith(f"{option}="):
+            found = word.partition("=")[2]
+    return found
 
 
 def _refuse(event: Any, verb: str) -> None:
