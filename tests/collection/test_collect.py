@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
@@ -93,6 +94,16 @@ def test_a_finished_recording_has_nothing_left_to_do(unbroken: Path) -> None:
     before = contents(unbroken)
     assert list(collect(TINY, unbroken)) == []
     assert contents(unbroken) == before
+
+
+def test_a_damaged_episode_is_recorded_again(unbroken: Path, tmp_path: Path) -> None:
+    shutil.copytree(unbroken, tmp_path / "damaged")
+    path = tmp_path / "damaged" / "episode-00001.parquet"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    assert [k for k, _ in collect(TINY, tmp_path / "damaged")] == [1]
+    assert contents(tmp_path / "damaged") == contents(unbroken)
 
 
 def test_a_folder_with_a_recording_of_other_settings_is_left_alone(unbroken: Path) -> None:

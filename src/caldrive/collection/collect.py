@@ -23,7 +23,8 @@ from caldrive.parallel.processes import parallel_map
 from caldrive.progress import Progress, silent
 from caldrive.provenance import code_version
 from caldrive.recordings.folder import Manifest, read_manifest
-from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, episode_path
+from caldrive.recordings.reader import read_episode
+from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, EpisodeError, episode_path
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
 from caldrive.world.traffic import sidewalks, start_places
@@ -39,7 +40,7 @@ LIMITS: Limits = {  # of the options that are numbers
 def collect(
     config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent
 ) -> Iterator[tuple[int, int]]:
-    """Records what is missing in a folder; yields (episode, frames) as they are done.
+    """Records what is missing or damaged in a folder; yields (episode, frames) as they are done.
 
     Where a worker dies, new ones go on. Raises ValueError where the folder holds a recording with other settings or
     another process records in it, RuntimeError where workers die again and again.
@@ -47,7 +48,7 @@ def collect(
     _check(config, workers)
     with locked_folder(folder):
         _claim(folder, config)
-        missing = [k for k in range(config.episodes) if not episode_path(folder, k).exists()]
+        missing = [k for k in range(config.episodes) if not _is_sound(episode_path(folder, k))]
         recorded = parallel_map(partial(_record, config, folder), missing, workers)
         try:
             for done, episode in enumerate(recorded, start=config.episodes - len(missing) + 1):
@@ -55,6 +56,14 @@ def collect(
                 yield episode
         finally:
             _close_world()
+
+
+def _is_sound(path: Path) -> bool:
+    """Whether an episode is there and can be read; a damaged one is recorded again."""
+    try:
+        return path.exists() and bool(read_episode(path, semantic=True))
+    except EpisodeError:
+        return False
 
 
 @lru_cache(maxsize=1)
