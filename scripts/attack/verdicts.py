@@ -53,6 +53,8 @@ def verdict(attempt: Attempt, ended: Ended, work: Path, before: Files) -> Verdic
 
 
 def _stopped(ended: Ended) -> Verdict | None:
+    if ended.stopped == "time" and PROGRESS.search(ended.stderr.strip()):
+        return Verdict(Outcome.RAN, "long work that says how far it is")  # such as 1,800 episodes, by empty settings
     if ended.stopped:
         outcome = Outcome.HANG if ended.stopped == "time" else Outcome.MEMORY
         return Verdict(outcome, f"stopped after {ended.seconds:.0f} s, {ended.cpu:.0f} s of a processor")

@@ -34,6 +34,7 @@ SENTENCE = "caldrive: found 3, wanted 4: type --cars 4\n"
         (Ended(1, "", 1, 1, "", "Traceback (most recent call last)"), Outcome.TRACEBACK),
         (Ended(-11, "", 1, 1, "", ""), Outcome.TRACEBACK),
         (Ended(-9, "time", 1, 1, "", ""), Outcome.HANG),
+        (Ended(-9, "time", 1, 1, "", "recording, 1 of 1800 episodes (0%)\n"), Outcome.RAN),
         (Ended(0, "", 1, 1, "", "", orphans=1), Outcome.HANG),
         (Ended(-9, "memory", 1, 1, "", ""), Outcome.MEMORY),
         (Ended(2, "", 1, 1, "", "caldrive: found too little memory for this, wanted more"), Outcome.MEMORY),
