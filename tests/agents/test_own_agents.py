@@ -211,6 +211,10 @@ def test_nonsense_in_a_benchmarks_worker_names_the_episode(
             "def act(self, observation): pass\ndef reset(self): raise KeyError('x')",
             "failed at its reset (KeyError: 'x'",
         ),
+        (
+            "def act(self, observation): pass\ndef __getattr__(self, name): raise RuntimeError(name)",
+            "Own failed at its reset (RuntimeError: reset",
+        ),
         ("def __getattr__(self, name): raise RuntimeError(name)", "Own fails when asked for act (RuntimeError: act"),
     ],
 )

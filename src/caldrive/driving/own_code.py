@@ -100,7 +100,7 @@ def _call(owner: Agent | World, method: Callable[..., Any], *arguments: Any, at:
 
 def _is_our_world(owner: Agent | World) -> bool:
     """Whether it is a world of caldrive, whose errors say themselves what to type."""
-    return hasattr(owner, "truth") and type(owner).__module__.startswith("caldrive.")
+    return type(owner).__module__.startswith("caldrive.") and hasattr(owner, "truth")
 
 
 def _observation(world: World, found: Any, at: str) -> Observation:
