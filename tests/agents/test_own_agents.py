@@ -154,6 +154,7 @@ NONSENSE = {
         "failed at step 0 (0.0 s) (GeneratorExit: , own",
     ),
     "an end of the program": ("raise SystemExit(0)", "Own failed at step 0 (0.0 s) (SystemExit: 0, own"),
+    "an array of numbers": ("return Control(np.array([0.1]))", "Own failed at step 0 (0.0 s) (TypeError: only 0-dim"),
     "an error later on": ("return 3 if observation.time > 0.25 else Control()", "returned 3 at step 3 (0.3 s), wanted"),
     "a decision that is none": (
         "self.decision = 'fast'\nreturn Control()",

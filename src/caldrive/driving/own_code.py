@@ -54,7 +54,11 @@ def next_step(agent: Agent, observation: Observation, number: int) -> tuple[Cont
     if decision is not None:
         _check_decision(agent, decision, at)
     # A network's numbers are often those of NumPy or torch, in 32 bits; the world reckons with Python's.
-    return Control(*map(float, astuple(control))), decision
+    return _call(agent, _in_pythons_numbers, control, at=at), decision
+
+
+def _in_pythons_numbers(control: Control) -> Control:
+    return Control(*map(float, astuple(control)))
 
 
 def reset_world(world: World, scenario: Scenario) -> Observation:
