@@ -50,7 +50,7 @@ def test_a_network_that_would_take_many_times_as_long_does_not_drive(tmp_path: P
 
 def test_a_model_for_the_oracle_is_refused_before_anything_is_driven() -> None:
     settings = AgentSettings(agent="oracle", model=Path("none.safetensors"))
-    with pytest.raises(ValueError, match=r"found --model none\.safetensors, but the oracle knows the truth"):
+    with pytest.raises(ValueError, match=r"found --model none\.safetensors, but the oracle takes none"):
         agent_entry("oracle").provenance(settings)
-    with pytest.raises(ValueError, match=r"found --model none\.safetensors, but the oracle knows the truth"):
+    with pytest.raises(ValueError, match=r"found --model none\.safetensors, but the oracle takes none"):
         set_up(settings)

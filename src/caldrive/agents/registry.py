@@ -8,7 +8,7 @@ names; its attribute `camera` says which camera it wants.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from caldrive.provenance import file_digest
 if TYPE_CHECKING:  # the command line's help waits for neither torch nor SUMO
     from caldrive.agents.cal import CALAgent
 
+OFFERED = ("model", "controller")  # settings that an agent may take
 SHIPPED_MODEL = Path(__file__).parents[1] / "models" / "cal.safetensors"
 
 
@@ -84,18 +85,13 @@ def _cal_provenance(settings: AgentSettings) -> dict[str, Any]:
 def _make_oracle(settings: AgentSettings, dt: float, truth: TruthSource | None) -> CALAgent:
     from caldrive.agents.cal import CALAgent, OraclePerception
 
-    _oracle_provenance(settings)
+    _require_taken("the oracle", ("controller",), settings)
     assert truth is not None
     return CALAgent(OraclePerception(truth), make_controller(settings.controller, settings.cap, dt))
 
 
 def _oracle_provenance(settings: AgentSettings) -> dict[str, Any]:
-    """Nothing. Raises ValueError where the settings name a model, which it would never see."""
-    if settings.model is not None:
-        raise ValueError(
-            f"found --model {settings.model}, but the oracle knows the truth and takes none: leave --model out, or "
-            "type --agent cal"
-        )
+    _require_taken("the oracle", ("controller",), settings)
     return {}
 
 
@@ -117,10 +113,13 @@ def agent_entry(name: str) -> AgentEntry:
 def _plugin_entry(plugin: Plugin) -> AgentEntry:
     """A row for somebody's own class."""
 
+    taken = [name for name in OFFERED if plugin.takes(name)]
+    hint = ", or give its __init__ a parameter of this name"
+
     def make(settings: AgentSettings, dt: float, truth: TruthSource | None) -> Agent:
-        _require_taken(plugin, settings)
+        _require_taken(plugin.name, taken, settings, hint)
         options: dict[str, Any] = {"model": settings.model, "cap": settings.cap, "dt": dt}
-        if plugin.takes("controller"):
+        if "controller" in taken:
             options["controller"] = make_controller(settings.controller, settings.cap, dt)
         agent: Agent = plugin.build(**options)
         if not callable(attribute(agent, "act")):
@@ -130,7 +129,7 @@ def _plugin_entry(plugin: Plugin) -> AgentEntry:
         return agent
 
     def provenance(settings: AgentSettings) -> dict[str, Any]:
-        _require_taken(plugin, settings)
+        _require_taken(plugin.name, taken, settings, hint)
         model = {"model": file_digest(settings.model)} if settings.model else {}
         return {"agent_source": plugin.source} | model
 
@@ -148,14 +147,14 @@ def _plugin_camera(plugin: Plugin) -> CameraConfig | None:
     return camera
 
 
-def _require_taken(plugin: Plugin, settings: AgentSettings) -> None:
-    """Raises ValueError where settings name a model or a controller that the class would never see."""
+def _require_taken(agent: str, taken: Sequence[str], settings: AgentSettings, hint: str = "") -> None:
+    """Raises ValueError where settings name a model or a controller that an agent would never see. taken: what it
+    takes; hint: what else to do."""
     usual = AgentSettings()
-    for name in ("model", "controller"):
-        if getattr(settings, name) != getattr(usual, name) and not plugin.takes(name):
+    for name in OFFERED:
+        if getattr(settings, name) != getattr(usual, name) and name not in taken:
             raise ValueError(
-                f"found --{name} {getattr(settings, name)}, but {plugin.name} takes none: leave --{name} out, "
-                f"or give its __init__ a parameter {name}"
+                f"found --{name} {getattr(settings, name)}, but {agent} takes none: leave --{name} out{hint}"
             )
 
 

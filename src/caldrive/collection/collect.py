@@ -48,7 +48,7 @@ def collect(
     _check(config, workers)
     with locked_folder(folder):
         _claim(folder, config)
-        missing = [k for k in range(config.episodes) if not _is_sound(episode_path(folder, k))]
+        missing = list(_missing(config.episodes, folder, progress))
         recorded = parallel_map(partial(_record, config, folder), missing, workers)
         try:
             for done, episode in enumerate(recorded, start=config.episodes - len(missing) + 1):
@@ -58,12 +58,16 @@ def collect(
             _close_world()
 
 
-def _is_sound(path: Path) -> bool:
-    """Whether an episode is there and can be read; a damaged one is recorded again."""
-    try:
-        return path.exists() and bool(read_episode(path, semantic=True))
-    except EpisodeError:
-        return False
+def _missing(episodes: int, folder: Path, progress: Progress) -> Iterator[int]:
+    """The episodes that are not there, or damaged."""
+    for k in range(episodes):
+        progress(f"looking at {folder}", k / episodes)
+        path = episode_path(folder, k)
+        try:
+            if not path.exists() or not len(read_episode(path, semantic=True)):
+                yield k
+        except EpisodeError:
+            yield k
 
 
 @lru_cache(maxsize=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from numbers import Real
 from typing import Any
@@ -22,8 +22,8 @@ DECISION_TYPES: dict[str, type] = {
 }  # fmt: skip
 OBSERVATION_TYPES: dict[str, type] = {"time": Real, "speed": Real, "command": Command}
 TRUTH_TYPES: dict[str, type] = {
-    "time": Real, "ego": VehicleState, "affordances": Affordances, "vehicles": tuple, "pedestrians": tuple,
-    "lights": tuple, "contacts": tuple, "opposite_share": Real, "sidewalk_share": Real, "route_done": Real,
+    "time": Real, "ego": VehicleState, "affordances": Affordances, "vehicles": Sequence, "pedestrians": Sequence,
+    "lights": Sequence, "contacts": Sequence, "opposite_share": Real, "sidewalk_share": Real, "route_done": Real,
     "route_length": Real, "goal_distance": Real, "speed_limit": Real,
 }  # fmt: skip
 

@@ -184,9 +184,9 @@ def _read_header(path: Path, schema: pa.Schema) -> dict[str, Any]:
     if METADATA_KEY not in metadata:
         raise EpisodeError(f"{path} is a Parquet file, but no episode of caldrive: record one with `caldrive collect`")
     header = read_json(metadata[METADATA_KEY], dict[str, Any])
-    version = header.get("version")
+    version = header.get("version", "unknown")
     if version != FORMAT_VERSION:
-        raise EpisodeError(f"{path} has format {version}, this caldrive reads {FORMAT_VERSION}: record again")
+        raise EpisodeError(f"{path} has the format {version}, this caldrive reads {FORMAT_VERSION}: record again")
     missing = [name for name in SCHEMA.names if name not in schema.names]
     if missing:
         raise EpisodeError(f"{path} lacks the column {missing[0]}: remove it and record again")
