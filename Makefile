@@ -14,7 +14,7 @@ drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
 # Each of the two has a core of its own: more threads would only take turns.
-PYTEST := LP_NUM_THREADS=0 OMP_NUM_THREADS=1 $(BIN)/pytest -n 2
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest -n 2
 
 test: $(READY) lint docs
 	$(PYTEST) $(ARGS)

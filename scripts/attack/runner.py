@@ -50,7 +50,7 @@ class Ended:
 
 def load_the_program() -> None:
     """All that commands load when they run, so that children need not, and the town that most of them drive in."""
-    os.environ |= {"LP_NUM_THREADS": "0", "OMP_NUM_THREADS": "1"}
+    os.environ["OMP_NUM_THREADS"] = "1"
     import caldrive.benchmark.replay
     import caldrive.benchmark.report.page
     import caldrive.benchmark.runner
@@ -127,9 +127,7 @@ def confine(work: Path, beside: Path, limits: Limits) -> None:
     os.chdir(work)
     temporary = beside / "tmp"
     temporary.mkdir()
-    usual = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     os.environ |= {"TMPDIR": str(temporary), "XDG_CACHE_HOME": str(beside / "cache")}
-    os.environ["MESA_SHADER_CACHE_DIR"] = usual  # else each child would compile them anew
     for limit, most in (
         (resource.RLIMIT_CORE, 0), (resource.RLIMIT_FSIZE, limits.file_size),
         (resource.RLIMIT_AS, int(limits.address_space)),

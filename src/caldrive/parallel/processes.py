@@ -57,9 +57,7 @@ def _pool_map(work: Callable[[Item], Result], items: dict[int, Item], workers: i
 
 
 def tune_process() -> None:
-    """Makes a worker fast. It has a core of its own, on which the threads with which llvmpipe draws would only take
-    turns with it (a tenth of the time)."""
-    os.environ.setdefault("LP_NUM_THREADS", "0")
+    """Makes a worker fast."""
     gc.set_threshold(*GC_THRESHOLDS)
 
 

@@ -75,9 +75,9 @@ def test_a_world_that_fails_to_start_leaves_no_simulation(
     broken: type[LabelRig | EmbeddedWorld], town02: RoadNetwork, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
-        raise RuntimeError("found no EGL")
+        raise RuntimeError("found no room")
 
     monkeypatch.setattr(broken, "truth" if broken is LabelRig else "_observe", fail)
-    with pytest.raises(RuntimeError, match="found no EGL"):
+    with pytest.raises(RuntimeError, match="found no room"):
         EmbeddedWorld().reset(a_scenario(town02))
     assert not libsumo.isLoaded()

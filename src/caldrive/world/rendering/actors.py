@@ -1,103 +1,129 @@
-"""Cars and people as instances: what each looks like follows from its id, where it stands from its state."""
+"""Cars and people as a picture draws them: what each looks like follows from its id, where it stands from its state."""
 
 from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from caldrive.datatypes import PedestrianState, VehicleState
+from caldrive.compiled import Floats, Integers
+from caldrive.datatypes import PedestrianState, Semantic, VehicleState
+from caldrive.world.rendering.pinhole import Frustum
 from caldrive.world.scene import cars, people
+from caldrive.world.scene.cars import SHAPES
 from caldrive.world.scene.ground import KERB_HEIGHT
+from caldrive.world.scene.meshes import RGB
 
-# placed: x, y, heading, phase of the gait (rad). scale: along, across, up, swing of the limbs (rad). colors: of slots 1
-# to 4, and in the last byte whether it stands on the sidewalk.
-INSTANCE = np.dtype([("placed", "4f4"), ("scale", "4f4"), ("colors", "u1", (4, 4))])
-
-Instances = NDArray[np.void]  # (N,) of INSTANCE
 STRIDE = 0.75  # m of one step
 SWING = 0.30  # rad of the limbs at 1 m/s
 FASTEST_SWING = 1.6  # m/s from which on limbs swing no wider
 STANDS = 0.3  # m/s below which the brake lamps are lit
-_PAINTS, _UPPERS, _TROUSERS, _SKINS, _HAIRS = (
-    np.array(colors, np.uint8) for colors in (cars.PAINTS, people.UPPERS, people.TROUSERS, people.SKINS, people.HAIRS)
-)
-_CAR_HEIGHTS = np.array([shape.height for shape in cars.SHAPES])
+CAR_DETAIL, PERSON_DETAIL = 22.0, 14.0  # m within which the fine meshes are drawn, for a small picture
+CAR_FAR, PERSON_FAR = 160.0, 80.0  # m beyond which nobody is drawn
+REACH = 6.0  # m around an actor in which something of it, or of its shadow, may be in view
+BLACK: RGB = (0, 0, 0)
+COLORS = 12  # numbers of an actor's four colours
+Row = tuple[float, ...]
+Actor = TypeVar("Actor", VehicleState, PedestrianState)
 
 
-@dataclass(frozen=True)
-class Actors:
-    """N cars or people."""
+class Actors(NamedTuple):
+    """N cars and people."""
 
-    instances: Instances
-    shapes: NDArray[np.int64]
-    """(N,): which mesh each takes."""
-    shadows: NDArray[np.float32]
+    meshes: Integers
+    """(N,), as in `actor_meshes`."""
+    classes: Integers
+    """(N,) of `Semantic`."""
+    places: Floats
+    """(N, 7): x, y in m, cosine and sine of the heading, cosine and sine of the angle that limbs swing by, m above the
+    road."""
+    scales: Floats
+    """(N, 3): along, across, up."""
+    colors: Floats
+    """(N, COLORS), of slots 1 to 4, in [0, 1]."""
+    shadows: Floats
     """(N, 8): x, y, heading, height, half length, half width (m), darkness underneath, height of the ground."""
 
-    @property
-    def at(self) -> NDArray[np.float32]:
-        """Positions (N, 2), m."""
-        return self.shadows[:, :2]
+
+def seen_actors(
+    frustum: Frustum, zoom: float, vehicles: Iterable[VehicleState], pedestrians: Iterable[PedestrianState]
+) -> Actors:
+    """Those in view. zoom: how many times as far as in a small picture they are seen."""
+    kinds, rows = list[tuple[int, int]](), list[Row]()
+    for vehicle, away in _in_view(frustum, vehicles, CAR_FAR * zoom):
+        look = _car_look(vehicle.id)
+        kinds.append((2 * look[0] + (away > CAR_DETAIL * zoom), int(Semantic.VEHICLE)))
+        rows.append(_car_row(vehicle, *look))
+    for person, away in _in_view(frustum, pedestrians, PERSON_FAR * zoom):
+        kinds.append((2 * len(SHAPES) + (away > PERSON_DETAIL * zoom), int(Semantic.PERSON)))
+        rows.append(_person_row(person, *_person_look(person.id)))
+    meshes, classes = np.array(kinds, np.int32).reshape(-1, 2).T.copy()
+    table = np.array(rows, np.float32).reshape(-1, 10 + COLORS + 8)
+    parts = np.split(table, (7, 10, 10 + COLORS), axis=1)
+    return Actors(meshes, classes, *(np.ascontiguousarray(part) for part in parts))
 
 
-def _seeds(ids: tuple[str, ...]) -> NDArray[np.int64]:
-    """A number (N,) for each id, from which its looks follow."""
-    return np.array([zlib.crc32(id.encode()) >> 3 for id in ids], dtype=np.int64)
+def _in_view(frustum: Frustum, actors: Iterable[Actor], far: float) -> Iterator[tuple[Actor, float]]:
+    """Those less than far (m) away of which something may be in view, each with the m to it."""
+    (x, y, _), (ahead_x, ahead_y), (left_x, left_y) = frustum.eye, frustum.ahead, frustum.left
+    tangent, slack = frustum.tangent, REACH * math.hypot(1.0, frustum.tangent)
+    for actor in actors:
+        dx, dy = actor.pose.x - x, actor.pose.y - y
+        ahead = ahead_x * dx + ahead_y * dy
+        if ahead > -REACH and abs(left_x * dx + left_y * dy) - ahead * tangent < slack:
+            away = math.hypot(dx, dy)
+            if away < far:
+                yield actor, away
 
 
-@lru_cache(maxsize=32)
-def _car_templates(ids: tuple[str, ...]) -> tuple[NDArray[np.int64], Instances]:
-    """Shapes, and instances with the colours filled in."""
-    seeds, instances = _seeds(ids), np.zeros(len(ids), INSTANCE)
-    instances["scale"][:, 2] = 1.0
-    instances["colors"][:, 0, :3] = _PAINTS[seeds % len(_PAINTS)]
-    instances["colors"][:, 2, :3] = cars.HEAD_LAMP
-    return seeds // len(_PAINTS) % len(cars.SHAPES), instances
+def _seed(id: str) -> int:
+    """A number from which an actor's looks follow."""
+    return zlib.crc32(id.encode()) >> 3
 
 
-@lru_cache(maxsize=32)
-def _person_templates(ids: tuple[str, ...]) -> tuple[NDArray[np.float64], Instances]:
-    """Heights over that of the mesh, and instances with the colours filled in."""
-    seeds, instances = _seeds(ids), np.zeros(len(ids), INSTANCE)
-    for k, palette in enumerate((_UPPERS, _TROUSERS, _SKINS, _HAIRS)):
-        instances["colors"][:, k, :3] = palette[seeds // 7**k % len(palette)]
-    return people.heights(seeds) / people.HEIGHT, instances
+def _bright(*colors: RGB) -> Row:
+    return tuple(value / 255 for color in colors for value in color)
 
 
-def car_actors(vehicles: Sequence[VehicleState]) -> Actors:
-    """Cars; shapes are numbered as in `cars.SHAPES`."""
-    shapes, templates = _car_templates(tuple([v.id for v in vehicles]))
-    instances, shadows = templates.copy(), np.empty((len(vehicles), 8), np.float32)
-    rows = [
-        (v.pose.x, v.pose.y, v.pose.heading, v.length / cars.LENGTH, v.width / cars.WIDTH, v.speed) for v in vehicles
-    ]
-    state = np.array(rows, dtype=np.float32).reshape(-1, 6)
-    instances["placed"][:, :3], instances["scale"][:, :2] = state[:, :3], state[:, 3:5]
-    instances["colors"][:, 1, :3] = np.where(state[:, 5:] < STANDS, cars.BRAKE_LAMP, cars.TAIL_LAMP)
-    shadows[:, :3], shadows[:, 3] = state[:, :3], 0.85 * _CAR_HEIGHTS[shapes]
-    shadows[:, 4:6] = state[:, 3:5] * (cars.LENGTH / 2 - 0.15, cars.WIDTH / 2 - 0.05)
-    shadows[:, 6:] = 0.75, 0.02
-    return Actors(instances, shapes, shadows)
+@lru_cache(maxsize=4096)
+def _car_look(id: str) -> tuple[int, Row]:
+    """A car's shape, and its paint."""
+    seed = _seed(id)
+    return seed // len(cars.PAINTS) % len(SHAPES), _bright(cars.PAINTS[seed % len(cars.PAINTS)])
 
 
-def person_actors(pedestrians: Sequence[PedestrianState]) -> Actors:
-    """People. Their steps follow from the way covered, so that no foot slides."""
-    height, templates = _person_templates(tuple([p.id for p in pedestrians]))
-    instances, shadows = templates.copy(), np.empty((len(pedestrians), 8), np.float32)
-    rows = [(p.pose.x, p.pose.y, p.pose.heading, p.speed, not p.on_road) for p in pedestrians]
-    state = np.array(rows, dtype=np.float64).reshape(-1, 5)
-    x, y, heading, speed, on_sidewalk = state.T
-    phase = math.pi / STRIDE * (x * np.cos(heading) + y * np.sin(heading))
-    instances["placed"][:, :3], instances["placed"][:, 3] = state[:, :3], np.remainder(phase, math.tau)
-    instances["scale"][:, :3] = height[:, None]
-    instances["scale"][:, 3] = SWING * np.minimum(speed, FASTEST_SWING)
-    instances["colors"][:, 3, 3] = 255 * on_sidewalk
-    shadows[:, :3], shadows[:, 3] = state[:, :3], 1.7 * height
-    shadows[:, 4:7], shadows[:, 7] = (0.12, 0.22, 0.45), 0.02 + KERB_HEIGHT * on_sidewalk
-    return Actors(instances, np.zeros(len(instances), dtype=np.int64), shadows)
+@lru_cache(maxsize=4096)
+def _person_look(id: str) -> tuple[float, Row]:
+    """A person's height over that of the mesh, and colours."""
+    seed, palettes = _seed(id), (people.UPPERS, people.TROUSERS, people.SKINS, people.HAIRS)
+    colors = _bright(*(palette[seed // 7**k % len(palette)] for k, palette in enumerate(palettes)))
+    return float(people.heights(np.array(seed))) / people.HEIGHT, colors
+
+
+def _car_row(car: VehicleState, shape: int, paint: Row) -> Row:
+    x, y, heading = car.pose.x, car.pose.y, car.pose.heading
+    along, across = car.length / cars.LENGTH, car.width / cars.WIDTH
+    tail = cars.BRAKE_LAMP if car.speed < STANDS else cars.TAIL_LAMP
+    half_length, half_width = along * (cars.LENGTH / 2 - 0.15), across * (cars.WIDTH / 2 - 0.05)
+    return (
+        x, y, math.cos(heading), math.sin(heading), 1.0, 0.0, 0.0, along, across, 1.0,
+        *paint, *_bright(tail, cars.HEAD_LAMP, BLACK),
+        x, y, heading, 0.85 * SHAPES[shape].height, half_length, half_width, 0.75, 0.02,
+    )  # fmt: skip
+
+
+def _person_row(person: PedestrianState, height: float, colors: Row) -> Row:
+    """A person's steps follow from the way covered, so that no foot slides."""
+    x, y, heading = person.pose.x, person.pose.y, person.pose.heading
+    cosine, sine = math.cos(heading), math.sin(heading)
+    swing = SWING * min(person.speed, FASTEST_SWING) * math.sin(math.pi / STRIDE * (x * cosine + y * sine))
+    lift = 0.0 if person.on_road else KERB_HEIGHT
+    return (
+        x, y, cosine, sine, math.cos(swing), math.sin(swing), lift, height, height, height,
+        *colors,
+        x, y, heading, 1.7 * height, 0.12, 0.22, 0.45, 0.02 + lift,
+    )  # fmt: skip

@@ -4,39 +4,51 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caldrive.checks import MOST_PIXELS
+from caldrive.compiled import Floats, f32
 from caldrive.datatypes import CameraConfig, Pose, VehicleState
 from caldrive.geometry import moved
 
-NEAR, FAR = 0.25, 900.0  # m, the clipping planes
 LEVEL = 0.1  # rad of pitch up to which the horizontal angle alone says what a picture covers
 ALL_AROUND = 1e3  # tangent of half an angle that covers everything ahead
-Matrix = NDArray[np.float64]
+
+
+class View(NamedTuple):
+    """What a camera sees, for compiled code. What a pixel shows w m ahead lies at position + w (ahead + column right +
+    row down)."""
+
+    matrix: Floats
+    """(3, 4): world to clip space: x to the right and y down, over the half width and the half height of the picture,
+    and w, m ahead. A point is seen where |x|, |y| <= w."""
+    position: Floats
+    """(3,) in m, as the next three."""
+    ahead: Floats
+    right: Floats
+    down: Floats
+    sides: Floats
+    """(2, 2): on the plane, unit vectors ahead and to the left."""
+    tangent: np.float32
+    """Of half the horizontal angle, see `Frustum`."""
+    focal: np.float32
+    """Focal length in pixels."""
 
 
 @dataclass(frozen=True)
 class Frustum:
     """What a camera covers, seen from above."""
 
-    eye: NDArray[np.float64]
-    """(3,) in m."""
-    ahead: NDArray[np.float64]
-    """Unit vector (2,)."""
-    left: NDArray[np.float64]
-    """Unit vector (2,)."""
+    eye: tuple[float, float, float]
+    """In m."""
+    ahead: tuple[float, float]
+    """Unit vector."""
+    left: tuple[float, float]
+    """Unit vector."""
     tangent: float
     """Of half the horizontal angle."""
-
-    def sees(self, at: NDArray[np.floating], reach: NDArray[np.floating] | float) -> NDArray[np.bool_]:
-        """Which circles around points (N, 2) of the plane reach into the view. reach: their radii (N,) or one, m."""
-        slope = math.sqrt(1 + self.tangent**2)
-        sides = np.stack((self.ahead, self.left)).astype(at.dtype)
-        ahead, beside = sides @ at.T - (sides @ self.eye[:2].astype(at.dtype))[:, None]
-        return np.asarray((np.abs(beside) - ahead * at.dtype.type(self.tangent) < reach * slope) & (ahead > -reach))
 
 
 @dataclass(frozen=True)
@@ -69,23 +81,35 @@ class PinholeCamera:
         """Focal length in pixels."""
         return self.size[0] / 2 / math.tan(math.radians(self.fov) / 2)
 
-    def matrix(self) -> Matrix:
-        """World to clip space (4, 4), upside down, so that the first row read back is the top one."""
+    @property
+    def _axes(self) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        """Unit vectors to the right, down and ahead."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
         cp, sp = math.cos(self.pitch), math.sin(self.pitch)
-        ahead, right, up = np.array([c * cp, s * cp, sp]), np.array([s, -c, 0.0]), np.array([-c * sp, -s * sp, cp])
-        width, height = self.size
-        far = (FAR + NEAR) / (FAR - NEAR)
-        rows = np.stack((2 * self.focal / width * right, -2 * self.focal / height * up, far * ahead, ahead))
-        shift = rows @ np.array([self.pose.x, self.pose.y, self.height])
-        return np.column_stack((rows, np.array([0, 0, -2 * FAR * NEAR / (FAR - NEAR), 0]) - shift))
+        return (s, -c, 0.0), (c * sp, s * sp, -cp), (c * cp, s * cp, sp)
+
+    def view(self) -> View:
+        """All of it, for compiled code."""
+        (right, down, ahead), (width, height), focal = self._axes, self.size, self.focal
+        position, frustum = (self.pose.x, self.pose.y, self.height), self.frustum()
+        numbers: list[float] = []
+        for axis, scale in ((right, 2 * focal / width), (down, 2 * focal / height), (ahead, 1.0)):
+            numbers += [scale * a for a in axis]
+            numbers.append(-scale * sum(a * at for a, at in zip(axis, position, strict=True)))
+        x, y = (1 - width) / (2 * focal), (1 - height) / (2 * focal)  # the middle of the first pixel
+        numbers += [*position, *(a + x * r + y * d for a, r, d in zip(ahead, right, down, strict=True))]
+        numbers += [*(r / focal for r in right), *(d / focal for d in down), *frustum.ahead, *frustum.left]
+        all = np.array(numbers, np.float32)
+        return View(
+            all[:12].reshape(3, 4), all[12:15], all[15:18], all[18:21], all[21:24], all[24:].reshape(2, 2),
+            f32(frustum.tangent), f32(focal),
+        )  # fmt: skip
 
     def frustum(self) -> Frustum:
         """What the picture covers on the plane."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
         tangent = math.tan(math.radians(self.fov) / 2) if abs(self.pitch) < LEVEL else ALL_AROUND
-        eye = np.array([self.pose.x, self.pose.y, self.height])
-        return Frustum(eye=eye, ahead=np.array([c, s]), left=np.array([-s, c]), tangent=tangent)
+        return Frustum((self.pose.x, self.pose.y, self.height), (c, s), (-s, c), tangent)
 
 
 def camera_on(ego: VehicleState, mount: CameraConfig) -> PinholeCamera:

@@ -1,18 +1,19 @@
-"""Which triangles of a town are drawn: those of the tiles in sight, in the level of detail of their distance, that face
-the eye and lie in view."""
+"""Which triangles of a town may be seen from a small place: those of the tiles in sight from there, in the level of
+detail of their distance, that face one of its corners."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
 from caldrive.world.rendering.occlusion import CELL, Cells
-from caldrive.world.rendering.pinhole import Frustum
 from caldrive.world.scene.meshes import Mesh, Triangles, Vertices, merge
 
 LARGE = 100.0  # m: larger triangles belong to no tile
@@ -41,9 +42,9 @@ class ViewCell:
     """m within which the NEAR meshes are drawn."""
 
     @classmethod
-    def around(cls, eye: NDArray[np.float64], size: float, detail: float) -> ViewCell:
-        """The one that an eye (3,) is in."""
-        x, y, z = (float(v) for v in np.floor(eye / size) * size)
+    def around(cls, eye: tuple[float, float, float], size: float, detail: float) -> ViewCell:
+        """The one that an eye is in."""
+        x, y, z = (math.floor(value / size) * size for value in eye)
         return cls(low=(x, y, z), size=size, detail=detail)
 
     @property
@@ -58,33 +59,36 @@ class ViewCell:
         return np.array(self.low) + self.size * steps
 
 
-@dataclass(frozen=True)
-class _Faces:
+class Faces(NamedTuple):
     """Triangles with what is needed to leave some out."""
 
-    triangles: Triangles  # (N, 3)
-    planes: Floats  # (N, 4): normal n, and n·p with its sign turned
-    middles: Floats  # (N, 2), m
-    reach: Floats  # (N,), m from the middle to the farthest corner, on the plane
+    triangles: Triangles
+    """(N, 3)."""
+    planes: Floats
+    """(N, 4): normal n, and n·p with its sign turned."""
+    middles: Floats
+    """(N, 2), m."""
+    reach: Floats
+    """(N,) m from the middle to the farthest corner, on the plane."""
 
-    def facing(self, eyes: NDArray[np.float64]) -> _Faces:
+    def facing(self, eyes: NDArray[np.float64]) -> Faces:
         """Those that face at least one of some eyes (M, 3)."""
         heights = self.planes @ np.column_stack((eyes, np.ones(len(eyes)))).T
         return self.take(np.flatnonzero((heights > -1e-3).any(axis=1)))
 
-    def take(self, chosen: NDArray[np.int64]) -> _Faces:
+    def take(self, chosen: NDArray[np.int64]) -> Faces:
         """Those with some numbers, in their order."""
-        return _Faces(self.triangles[chosen], self.planes[chosen], self.middles[chosen], self.reach[chosen])
+        return Faces(self.triangles[chosen], self.planes[chosen], self.middles[chosen], self.reach[chosen])
 
 
-def _faces(vertices: Vertices, triangles: Triangles) -> _Faces:
+def _faces(vertices: Vertices, triangles: Triangles) -> Faces:
     corners = vertices["position"][triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat = corners[..., :2]
     middles = flat.mean(axis=1)
     reach = np.sqrt(((flat - middles[:, None]) ** 2).sum(axis=2).max(axis=1))
     planes = np.column_stack((normal, -(normal * corners[:, 0]).sum(axis=1)))
-    return _Faces(triangles, planes, middles, reach)
+    return Faces(triangles, planes.astype(np.float32), middles, reach)
 
 
 class TileGrid:
@@ -101,22 +105,18 @@ class TileGrid:
         order = np.argsort(tile_of, kind="stable")
         self.bounds = np.searchsorted(tile_of[order], np.arange(len(self.tiles) + 1))
         self.faces = faces.take(order)
-        self._remembered: dict[ViewCell, _Faces] = {}
+        self._remembered: dict[ViewCell, Faces] = {}
 
-    def visible(
-        self, frustum: Frustum, view_cell: ViewCell, cells_in_sight: Callable[[], Cells | None], far: float
-    ) -> Triangles:
-        """Triangles (N, 3) in view that face the eye, up to far (m). cells_in_sight: what can be seen from the view
-        cell, None for all; asked once for each view cell."""
+    def seen_from(self, view_cell: ViewCell, cells_in_sight: Callable[[], Cells | None], far: float) -> Faces:
+        """Faces up to far (m) that may be seen from somewhere in a view cell, the nearest first. cells_in_sight: what
+        can be seen from there, None for all; asked once for each view cell."""
         if view_cell not in self._remembered:
             if len(self._remembered) >= KEPT:
                 self._remembered.pop(next(iter(self._remembered)))
             self._remembered[view_cell] = self._in_sight(cells_in_sight(), view_cell, far).facing(view_cell.corners)
-        faces = self._remembered[view_cell]
-        front = faces.planes @ np.array((*frustum.eye, 1.0), np.float32) > 0
-        return faces.triangles[front & frustum.sees(faces.middles, faces.reach)]
+        return self._remembered[view_cell]
 
-    def _in_sight(self, cells: Cells | None, view_cell: ViewCell, far: float) -> _Faces:
+    def _in_sight(self, cells: Cells | None, view_cell: ViewCell, far: float) -> Faces:
         """Faces of the tiles in sight, nearest first; those that belong to no tile come last."""
         level = self.tiles[:, 0]
         distance = np.hypot(*((self.tiles[:, 1:] + 0.5) * CELL - view_cell.middle).T)

@@ -14,6 +14,8 @@ from caldrive.world.scene.weather import Lighting, Weather
 COLUMNS, ROWS = 512, 128  # pixels
 LOWEST, HIGHEST = -0.08, 1.2  # rad, elevations of the panorama's lower and upper edge
 RADIUS = 400.0  # m, of the dome
+FAR_OFF = 100.0  # times as far away it lies behind everything
+DROPS = 128  # texels of the rain along each side
 
 
 def panorama(weather: Weather, lighting: Lighting, town_seed: int) -> NDArray[np.uint8]:
@@ -83,3 +85,24 @@ def dome_mesh(columns: int = 18) -> Mesh:
         low, high = k * (columns + 1) + column, (k + 1) * (columns + 1) + column
         triangles += [np.stack((low, high, low + 1), 1), np.stack((low + 1, high, high + 1), 1)]
     return Mesh(rows.reshape(-1), np.concatenate(triangles).astype(np.uint32))
+
+
+def dome_triangles() -> NDArray[np.float32]:
+    """The dome (T, 3, 5): a direction (3,), u, v for each corner of its triangles, which face the middle."""
+    mesh = dome_mesh()
+    corners = mesh.vertices[mesh.triangles]
+    return np.concatenate((corners["position"] * FAR_OFF, corners["uv"][..., :2]), axis=2).astype(np.float32)
+
+
+def rain_streaks() -> NDArray[np.uint8]:
+    """Streaks of rain (DROPS, DROPS) that repeat at the edges, each two texels wide."""
+    rng = np.random.default_rng(7)
+    picture = np.zeros((DROPS, DROPS))
+    for x, y, length in zip(
+        rng.integers(DROPS, size=70), rng.integers(DROPS, size=70), rng.integers(10, 26, 70), strict=True
+    ):
+        rows = (y + np.arange(length)) % DROPS
+        picture[rows, x] = np.maximum(picture[rows, x], np.linspace(0.3, 1.0, length))
+        beside = (x + 1) % DROPS
+        picture[rows, beside] = np.maximum(picture[rows, beside], np.linspace(0.1, 0.4, length))
+    return np.asarray(picture * 255, dtype=np.uint8)
