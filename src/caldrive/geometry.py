@@ -48,15 +48,6 @@ def positions(things: Iterable[Posed]) -> Points:
     return np.array([(thing.pose.x, thing.pose.y) for thing in things], dtype=float).reshape(-1, 2)
 
 
-def ahead_and_left(
-    points: Points, at: Points, headings: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """N points (N, 2) seen from M frames, by their origins (M, 2) and headings (M,): ahead of each and to its left
-    (N, M), m."""
-    d, u, v = points[:, None] - at, np.cos(headings), np.sin(headings)
-    return d[..., 0] * u + d[..., 1] * v, d[..., 1] * u - d[..., 0] * v
-
-
 def moved(pose: Pose, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> Pose:
     """The pose after going forward and left (m), then turning (rad), all in its own frame."""
     c, s = math.cos(pose.heading), math.sin(pose.heading)

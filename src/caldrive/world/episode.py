@@ -99,9 +99,13 @@ class Episode:
         here, reach = ego.pose, half_diagonal(ego) + PUSHED
         near = self.town.obstacles.near(here, reach)
         actors: tuple[VehicleState | PedestrianState, ...] = (*before.vehicles, *before.pedestrians)
-        for actor in actors:
-            if math.hypot(actor.pose.x - here.x, actor.pose.y - here.y) < reach + ACTOR_REACH:
-                near.append(obstacle_of(actor))
+        x, y, reach = here.x, here.y, reach + ACTOR_REACH
+        near += [
+            obstacle_of(actor)
+            for actor in actors
+            if abs(actor.pose.x - x) < reach and abs(actor.pose.y - y) < reach
+            if math.hypot(actor.pose.x - x, actor.pose.y - y) < reach
+        ]
         ego, contacts = resolve(ego, near)
         self._ego = replace(self._ego, pose=ego.pose, speed=ego.speed)
         return contacts

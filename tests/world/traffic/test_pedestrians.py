@@ -10,7 +10,7 @@ import shapely
 
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.traffic.pedestrians import Pedestrians, may_walk
+from caldrive.world.traffic.pedestrians import Pedestrians
 from caldrive.world.traffic.sidewalks import find_sidewalks
 
 DT = 0.1
@@ -79,9 +79,9 @@ def test_people_walk_at_a_walking_pace_and_look_where_they_go(busy: Walk) -> Non
 
 def test_people_cross_from_one_sidewalk_to_another(town02: RoadNetwork) -> None:
     group = people(town02, 60, crossing=5.0)
-    loops = group.loop.copy()
+    loops = group.walkers.loop.copy()
     walk(group, 40)
-    assert (loops != group.loop).sum() > 5
+    assert (loops != group.walkers.loop).sum() > 5
 
 
 def test_crossings_lead_straight_over_the_road_from_kerb_to_kerb(town: RoadNetwork) -> None:
@@ -128,83 +128,17 @@ def test_people_walk_in_a_town_without_cars(town02: RoadNetwork) -> None:
     assert len(group.states()) == 30
 
 
-def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float = 1.2) -> bool:
-    """Whether somebody at (x, y) may walk (dx, dy)."""
-    return bool(may_walk(np.array([(x, y)]), np.array([(dx, dy)]), np.array([pace]), [car])[0])
-
-
-def car(speed: float, heading: float = 0.0) -> VehicleState:
-    return VehicleState(Pose(0, 0, heading), speed, length=4.2, width=1.8)
-
-
-OVER_THE_LANE = (0.0, 7.0)  # m, from the kerb right of a car
-
-
-@pytest.mark.parametrize(("ahead", "speed", "free"), [(25.0, 6.0, False), (60.0, 6.0, True), (25.0, 0.0, True)])
-def test_people_reckon_with_a_slow_car_that_speeds_up_before_it_sees_them(
-    ahead: float, speed: float, free: bool
-) -> None:
-    assert may(car(speed), 2.1 + ahead, -2.2, *OVER_THE_LANE) is free
-
-
-@pytest.mark.parametrize("ahead", [4.0, 10.0, 20.0])
-def test_nobody_steps_in_front_of_a_fast_car(ahead: float) -> None:
-    assert not may(car(14.0), 2.1 + ahead, -2.2, *OVER_THE_LANE)
-
-
-@pytest.mark.parametrize("ahead", [1.5, 4.0, 20.0])
-def test_people_step_before_a_standing_car(ahead: float) -> None:
-    assert may(car(0.0), 2.1 + ahead, -2.2, *OVER_THE_LANE)
-
-
-def test_people_do_not_walk_into_the_side_of_a_standing_car() -> None:
-    assert not may(car(0.0), 0.0, -2.2, *OVER_THE_LANE)
-
-
-def test_people_step_behind_a_car_and_far_before_it() -> None:
-    assert may(car(8.0), -6.0, -2.2, *OVER_THE_LANE)
-    assert may(car(8.0), 60.0, -2.2, *OVER_THE_LANE)
-
-
-def test_a_driver_at_30_can_stop_for_whoever_steps_out_before_him() -> None:
-    speed = 30 / 3.6
-    nearest = min(x for x in np.arange(2.2, 60, 0.1) if may(car(speed), x, -2.06, *OVER_THE_LANE))
-    assert nearest - 2.1 > speed**2 / (2 * 8.0) + 0.2 * speed
-
-
-def test_whoever_already_stands_in_a_cars_way_goes_on_out_of_it() -> None:
-    assert may(car(10.0), 12.0, 0.5, 0.0, 3.0)
-
-
-def test_people_walk_freely_along_the_sidewalk_and_away_from_the_road() -> None:
-    assert may(car(14.0), 10.0, -3.5, 5.0, 0.0)
-    assert may(car(14.0), 10.0, -3.5, 0.0, -2.0)
-
-
-@pytest.mark.parametrize("heading", [0.0, 1.0, math.pi / 2, -2.5])
-def test_the_look_before_a_step_does_not_depend_on_the_compass(heading: float) -> None:
-    c, s = math.cos(heading), math.sin(heading)
-    for ahead in (5.0, 25.0, 70.0):
-        turned = [(c * x - s * y, s * x + c * y) for x, y in ((ahead, -2.5), OVER_THE_LANE)]
-        assert may(car(10.0, heading), *turned[0], *turned[1]) == may(car(10.0), ahead, -2.5, *OVER_THE_LANE)
-
-
 def test_nobody_is_run_over_on_a_street_where_a_fast_car_drives_up_and_down(town02: RoadNetwork) -> None:
     lane = max(town02.driveable, key=lambda lane: lane.line.length).line
     group, closest = people(town02, 80, 4, crossing=10.0), math.inf
     for i in range(300):
         pose = lane.pose_at((i * 1.2) % lane.length)
         ego = VehicleState(pose, 12.0, length=4.2, width=1.8)
-        before = group.on_road.copy()
+        before = group.walkers.on_road.copy()
         group.step(DT, [ego])
         c, s = math.cos(pose.heading), math.sin(pose.heading)
-        d = group.position - (pose.x, pose.y)
-        stepped = group.on_road & ~before & (np.abs(-s * d[:, 0] + c * d[:, 1]) < 2.0)
+        d = group.walkers.position - (pose.x, pose.y)
+        stepped = group.walkers.on_road & ~before & (np.abs(-s * d[:, 0] + c * d[:, 1]) < 2.0)
         ahead = (c * d[:, 0] + s * d[:, 1] - 2.1)[stepped]
         closest = min([closest, *ahead[ahead > 0]])
     assert closest > 12.0
-
-
-@pytest.mark.filterwarnings("error")
-def test_whoever_stands_at_the_end_of_his_way_already_arrives_without_a_warning() -> None:
-    assert may(car(10.0), 12.0, 0.5, 0.0, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -44,22 +45,26 @@ class Crossing:
         )
 
 
+class Loops(NamedTuple):
+    """Places on closed lines, for compiled code."""
+
+    lengths: Floats
+    """Of the lines, m."""
+    table: Floats
+    """x, y, heading every `grain` metres of all lines, one after the other."""
+    first: NDArray[np.int64]
+    """Each line's first row in the table."""
+    grain: float
+    """m."""
+
+
 @dataclass(frozen=True)
 class Sidewalks:
     """A town's sidewalk loops."""
 
     crossings: tuple[tuple[Crossing, ...], ...]
     """Those that start on each loop, ordered by s."""
-    lengths: Floats
-    """Of the loops, m."""
-    table: Floats
-    """x, y, heading every GRAIN metres of all loops, one after the other."""
-    first: NDArray[np.int64]
-    """Each loop's first row in the table."""
-
-    def poses(self, loop: NDArray[np.int64], s: Floats) -> Floats:
-        """x, y, heading (N, 3) of places on loops, by the loops' numbers (N,) and the metres along them (N,)."""
-        return np.asarray(self.table[self.first[loop] + (s / GRAIN).astype(int)])
+    loops: Loops
 
 
 @lru_cache(maxsize=8)
@@ -72,9 +77,12 @@ def find_sidewalks(roads: RoadNetwork) -> Sidewalks:
     tree = shapely.STRtree(loops)
     return Sidewalks(
         crossings=tuple(_crossings(loop, table, tree, middle) for loop, table in enumerate(tables)),
-        lengths=np.array([ring.length for ring in loops]),
-        table=np.concatenate(tables),
-        first=np.cumsum([0, *(len(table) for table in tables[:-1])]),
+        loops=Loops(
+            lengths=np.array([ring.length for ring in loops]),
+            table=np.concatenate(tables),
+            first=np.cumsum([0, *(len(table) for table in tables[:-1])]),
+            grain=GRAIN,
+        ),
     )
 
 
@@ -112,7 +120,7 @@ def _crossings(loop: int, table: Floats, tree: shapely.STRtree, middle: shapely.
 
 def room(roads: RoadNetwork) -> int:
     """How many people a town's sidewalks hold."""
-    return int(find_sidewalks(roads).lengths.sum() / SPACE_PER_PERSON)
+    return int(find_sidewalks(roads).loops.lengths.sum() / SPACE_PER_PERSON)
 
 
 def require_room(roads: RoadNetwork, n: int) -> None:

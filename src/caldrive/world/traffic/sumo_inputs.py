@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import libsumo
 import numpy as np
+from numpy.typing import NDArray
 
-from caldrive.datatypes import LightState, PedestrianState, VehicleState
-from caldrive.geometry import ahead_and_left, positions
+from caldrive.compiled import compiled
+from caldrive.datatypes import LightState, PedestrianState, Points, VehicleState
+from caldrive.geometry import positions
 from caldrive.world.traffic.traffic_lights import Phase, TrafficLights
 
 _LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
@@ -49,12 +52,25 @@ class SumoLights:
 def speed_caps(cars: Sequence[VehicleState], people: Sequence[PedestrianState]) -> dict[str, float]:
     """How fast some cars may drive (m/s), by their ids, so that they stop before anybody on the road; those whose speed
     this changes."""
-    heading, length, speed = np.array([(c.pose.heading, c.length, c.speed) for c in cars]).reshape(-1, 3).T
-    ahead, left = ahead_and_left(positions(p for p in people if p.on_road), positions(cars), heading)
-    ahead -= length / 2
-    # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
-    half_width = np.where(ahead > BESIDE, HALF_CORRIDOR, HALF_BONNET)
-    near = (np.abs(left) < half_width) & (ahead > -BESIDE) & (ahead < PEOPLE_AHEAD)
-    gap = np.where(near, np.maximum(ahead - STOPPING_GAP, 0.0), np.inf).min(axis=0, initial=np.inf)
-    allowed = np.sqrt(2 * COMFORTABLE_BRAKE * gap)
-    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < speed + NOTICE).tolist()}
+    walkers = positions(person for person in people if person.on_road)
+    if not len(walkers):
+        return {}
+    boxes = np.array([(c.pose.x, c.pose.y, c.pose.heading, c.length, c.speed) for c in cars]).reshape(-1, 5)
+    allowed = np.empty(len(boxes))
+    _allowed_speeds(boxes, walkers, allowed)
+    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < boxes[:, 4] + NOTICE).tolist()}
+
+
+@compiled
+def _allowed_speeds(boxes: Points, people: Points, allowed: NDArray[np.float64]) -> None:
+    """Writes how fast each car may drive (m/s); boxes: x, y, heading, length, speed; people: (N, 2) on the road."""
+    for k in range(len(boxes)):
+        c, s, gap = math.cos(boxes[k, 2]), math.sin(boxes[k, 2]), math.inf
+        for person in range(len(people)):
+            dx, dy = people[person, 0] - boxes[k, 0], people[person, 1] - boxes[k, 1]
+            ahead, left = dx * c + dy * s - boxes[k, 3] / 2, dy * c - dx * s
+            # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
+            half_width = HALF_CORRIDOR if ahead > BESIDE else HALF_BONNET
+            if abs(left) < half_width and -BESIDE < ahead < PEOPLE_AHEAD:
+                gap = min(gap, max(ahead - STOPPING_GAP, 0.0))
+        allowed[k] = math.sqrt(2 * COMFORTABLE_BRAKE * gap)

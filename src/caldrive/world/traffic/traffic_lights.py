@@ -7,6 +7,7 @@ leaves a lawful driver of a short route room for one wait only.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.compiled import compiled
 from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
-from caldrive.geometry import ahead_and_left
 from caldrive.world.roads.network import LightPost, RoadNetwork
 
 SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
@@ -25,6 +26,7 @@ LOOP = 24.0  # m before the stop line where somebody who waits is noticed
 HALF_CAR = 2.0  # m from a car's front to its centre, about
 LOOP_HALF_WIDTH = 2.0  # m to either side of the approach
 JUST_BEYOND = 0.5  # m past the stop line where somebody still waits
+SAME_WAY = 0.7  # cosine of the angle to the approach from which on somebody drives along it
 INSIDE = 4.0  # m nearer to the middle than the stop lines: inside the junction
 
 
@@ -93,12 +95,31 @@ class _LoopDetectors:
     def look(self, poses: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether somebody waits at each post (P,), and whether each junction is occupied (J,); poses: x, y, heading of
         cars (N, 3)."""
-        ahead, left = ahead_and_left(poses[:, :2], self.stops, self.headings)
-        same_way = np.cos(poses[:, 2, None] - self.headings) > 0.7
-        before_line = (ahead > -LOOP - HALF_CAR) & (ahead < JUST_BEYOND)
-        waiting = (before_line & (np.abs(left) < LOOP_HALF_WIDTH) & same_way).any(0)
-        away = np.hypot(*np.moveaxis(poses[None, :, :2] - self.centers[:, None], -1, 0))
-        return waiting, (away < self.radii[:, None] - INSIDE).any(1)
+        waiting, occupied = np.zeros(len(self.headings), np.bool_), np.zeros(len(self.radii), np.bool_)
+        _look(poses, self.stops, self.headings, waiting)
+        _look_inside(poses, self.centers, self.radii, occupied)
+        return waiting, occupied
+
+
+@compiled
+def _look(poses: Points, stops: Points, headings: Points, waiting: NDArray[np.bool_]) -> None:
+    """Writes whether somebody (N, 3) waits at each post (P,), by the middles of the stop lines (P, 2)."""
+    for post in range(len(stops)):
+        c, s = math.cos(headings[post]), math.sin(headings[post])
+        for k in range(len(poses)):
+            dx, dy = poses[k, 0] - stops[post, 0], poses[k, 1] - stops[post, 1]
+            ahead, left = dx * c + dy * s, dy * c - dx * s
+            if -LOOP - HALF_CAR < ahead < JUST_BEYOND and abs(left) < LOOP_HALF_WIDTH:
+                waiting[post] |= math.cos(poses[k, 2] - headings[post]) > SAME_WAY
+
+
+@compiled
+def _look_inside(poses: Points, centers: Points, radii: Points, occupied: NDArray[np.bool_]) -> None:
+    """Writes whether somebody is inside each junction (J,)."""
+    for junction in range(len(centers)):
+        for k in range(len(poses)):
+            away = math.hypot(poses[k, 0] - centers[junction, 0], poses[k, 1] - centers[junction, 1])
+            occupied[junction] |= away < radii[junction] - INSIDE
 
 
 class TrafficLights:

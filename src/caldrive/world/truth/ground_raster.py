@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -12,21 +13,22 @@ from PIL import Image as PILImage
 from PIL import ImageDraw
 from shapely import STRtree
 
+from caldrive.compiled import Integers, compiled
 from caldrive.datatypes import Points, Pose, VehicleState
-from caldrive.geometry import Polyline, to_world
+from caldrive.geometry import Polyline
 from caldrive.world.roads.network import RoadNetwork, lane_area
 
 CELL = 0.2  # m
 MARGIN = 12.0  # m around the roads
-TILE, KEPT = 2400, 8  # cells along a side of a tile, and how many tiles are remembered
+TILE, KEPT = 600, 24  # cells along a side of a tile, and how many tiles are remembered
 _SAMPLES = (12, 6)  # along and across the car
+STRAIGHT = 1e-3  # rad by which a straight line turns at most from one part to the next
 
 
-@dataclass(frozen=True)
-class _Tile:
+class _Tile(NamedTuple):
     """A square of the town, TILE cells wide."""
 
-    lane: NDArray[np.int32]  # the number of the lane, 0 for none
+    lane: Integers  # the number of the lane, 0 for none
     sidewalk: NDArray[np.bool_]
 
 
@@ -37,6 +39,7 @@ class GroundRaster:
         x0, y0, _, _ = roads.bounds
         self.origin = np.array([x0 - MARGIN, y0 - MARGIN])
         self.lines: list[Polyline] = [lane.line for lane in roads.driveable]
+        self._straight = [_heading(line) for line in self.lines]
         self._lanes = STRtree([lane_area(lane.line, lane.width) for lane in roads.driveable])
         self._sidewalks = STRtree(shapely.get_parts(roads.sidewalk))
         self._tiles: dict[tuple[int, int], _Tile] = {}
@@ -59,24 +62,41 @@ class GroundRaster:
     def shares(self, car: VehicleState, travel: float) -> tuple[float, float]:
         """Shares in [0, 1] of the car's area on the opposite lane and on the sidewalk. travel: the route's heading
         there, rad."""
-        cells = np.floor((_spread(car) - self.origin) / CELL).astype(int)
-        tiles = cells // TILE
-        lanes, sidewalk = np.zeros(len(cells), np.int32), np.zeros(len(cells), bool)
-        for column, row in np.unique(tiles, axis=0).tolist():
-            here = (tiles == (column, row)).all(1)
-            x, y = (cells[here] % TILE).T
-            tile = self._tile(column, row)
-            lanes[here], sidewalk[here] = tile.lane[y, x], tile.sidewalk[y, x]
-        opposite = sum(
-            int((lanes == number).sum())
-            for number in np.unique(lanes)
-            if number and self._opposes(int(number), car.pose, travel)
-        )
-        return opposite / len(cells), float(sidewalk.sum()) / len(cells)
+        pose, grid, (x0, y0) = car.pose, _spread(car.length, car.width), self.origin.tolist()
+        frame = pose.x - x0, pose.y - y0, math.cos(pose.heading), math.sin(pose.heading)
+        under, sidewalk, reach = np.zeros(len(grid), np.int32), 0, math.hypot(car.length, car.width) / 2
+        columns, rows = ({math.floor((at + side) / (CELL * TILE)) for side in (-reach, reach)} for at in frame[:2])
+        for column in columns:
+            for row in rows:
+                tile = self._tile(column, row)
+                sidewalk += _look_under(grid, frame, tile, (column * TILE, row * TILE), under)
+        lanes = under.tolist()
+        opposite = sum(lanes.count(number) for number in set(lanes) if number and self._opposes(number, pose, travel))
+        return opposite / len(lanes), sidewalk / len(lanes)
 
     def _opposes(self, number: int, pose: Pose, travel: float) -> bool:
         """Whether traffic on a lane runs against a direction of travel (rad)."""
-        return math.cos(self.lines[number - 1].project(pose.x, pose.y).heading - travel) < -0.5
+        heading = self._straight[number - 1]
+        if heading is None:
+            heading = self.lines[number - 1].project(pose.x, pose.y).heading
+        return math.cos(heading - travel) < -0.5
+
+
+@compiled
+def _look_under(
+    grid: Points, frame: tuple[float, float, float, float], tile: _Tile, low: tuple[int, int], lanes: Integers
+) -> int:
+    """Writes the lanes under those points (N, 2) of a car that lie in a tile; returns how many lie on sidewalks. frame:
+    x, y of the car from the origin, cosine and sine of its heading; low: the tile's first column and row."""
+    sidewalk, size = 0, len(tile.lane)
+    for k in range(len(grid)):
+        x = frame[0] + frame[2] * grid[k, 0] - frame[3] * grid[k, 1]
+        y = frame[1] + frame[3] * grid[k, 0] + frame[2] * grid[k, 1]
+        column, row = math.floor(x / CELL) - low[0], math.floor(y / CELL) - low[1]
+        if 0 <= column < size and 0 <= row < size:
+            lanes[k] = tile.lane[row, column]
+            sidewalk += tile.sidewalk[row, column]
+    return sidewalk
 
 
 def _draw(polygons: list[tuple[shapely.Polygon, int]], low: Points) -> NDArray[np.int32]:
@@ -93,9 +113,15 @@ def _draw(polygons: list[tuple[shapely.Polygon, int]], low: Points) -> NDArray[n
     return np.array(canvas, dtype=np.int32)
 
 
-def _spread(car: VehicleState) -> NDArray[np.float64]:
-    """Points spread evenly over a car, (N, 2)."""
+@lru_cache(maxsize=16)
+def _spread(length: float, width: float) -> Points:
+    """Points spread evenly over a car, (N, 2) in its frame."""
     along = (np.arange(_SAMPLES[0]) + 0.5) / _SAMPLES[0] - 0.5
     across = (np.arange(_SAMPLES[1]) + 0.5) / _SAMPLES[1] - 0.5
-    grid = np.stack(np.meshgrid(along * car.length, across * car.width), axis=-1).reshape(-1, 2)
-    return to_world(car.pose, grid)
+    return np.stack(np.meshgrid(along * length, across * width), axis=-1).reshape(-1, 2)
+
+
+def _heading(line: Polyline) -> float | None:
+    """A straight line's heading, rad."""
+    turns = np.abs(np.diff(line.headings))
+    return float(line.headings[0]) if turns.max(initial=0.0) < STRAIGHT else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,20 +15,20 @@ from caldrive.datatypes import (
     CameraConfig,
     Contact,
     PedestrianState,
-    Points,
     Pose,
     TrafficLight,
     Truth,
     VehicleState,
 )
-from caldrive.geometry import moved, positions, to_local
+from caldrive.geometry import moved, positions
 from caldrive.scenarios import Scenario
 from caldrive.world.roads.route import Route
 from caldrive.world.town import Town
 from caldrive.world.truth.labels import label
 from caldrive.world.truth.other_commands import Fork, alternatives, forks
 
-IN_REACH = 40.0  # m within which signs and lights are looked at
+IN_REACH = 25.0  # m within which signs and lights count
+MARGIN = 15.0  # m that a car may drive until they are looked for again
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ class LabelRig:
     ) -> None:
         self.town, self.route, self.scenario, self.front_axle = town, route, scenario, front_axle
         self._limits = town.limits_along(route)
-        self._signs_at, self._lights_at = positions(town.signs), positions(lights)
+        self._posts = [positions(lights), positions(town.signs)]
+        self._near: tuple[Pose, list[list[int]]] | None = None  # where it was last looked for posts, and those found
 
     @cached_property
     def _forks(self) -> list[Fork]:
@@ -65,6 +67,7 @@ class LabelRig:
 
     def label(self, ego: VehicleState, state: WorldState) -> Affordances:
         """The affordances of a car among all others; ego: where that car is and how fast."""
+        lights, signs = self._posts_near(ego.pose)
         return label(
             ego,
             self.front_axle,
@@ -72,9 +75,17 @@ class LabelRig:
             near=state.progress,
             vehicles=state.vehicles,
             pedestrians=state.pedestrians,
-            lights=[state.lights[i] for i in _near(ego.pose, self._lights_at)],
-            signs=[self.town.signs[i] for i in _near(ego.pose, self._signs_at)],
+            lights=[state.lights[i] for i in lights],
+            signs=[self.town.signs[i] for i in signs],
         )
+
+    def _posts_near(self, here: Pose) -> list[list[int]]:
+        """Which lights and signs are in reach, and some more."""
+        if self._near is None or math.hypot(here.x - self._near[0].x, here.y - self._near[0].y) > MARGIN:
+            square = IN_REACH + MARGIN
+            away = [np.abs(posts - (here.x, here.y)).max(axis=1, initial=0.0) for posts in self._posts]
+            self._near = here, [np.flatnonzero(distances < square).tolist() for distances in away]
+        return self._near[1]
 
     def label_at(self, mount: CameraConfig, state: WorldState) -> Affordances:
         """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
@@ -102,14 +113,9 @@ class LabelRig:
             sidewalk_share=sidewalk,
             route_done=min(state.progress, self.route.length),
             route_length=self.route.length,
-            goal_distance=float(np.linalg.norm(to_local(ego.pose, np.array([goal.x, goal.y])))),
+            goal_distance=math.hypot(goal.x - ego.pose.x, goal.y - ego.pose.y),
             speed_limit=[limit for s, limit in self._limits if s <= state.progress + 0.1][-1],
         )
-
-
-def _near(here: Pose, positions: Points) -> list[int]:
-    """Which of the positions (N, 2) lie within a square around here."""
-    return np.flatnonzero(np.abs(positions - (here.x, here.y)).max(axis=1, initial=0.0) < IN_REACH).tolist()
 
 
 def _pose_under(mount: CameraConfig, ego: Pose) -> Pose:

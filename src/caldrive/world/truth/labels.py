@@ -7,11 +7,9 @@ any simulator that can say where things are.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeVar
 
 from caldrive.datatypes import (
     MAX_CENTER_DISTANCE,
@@ -19,17 +17,17 @@ from caldrive.datatypes import (
     Affordances,
     LightState,
     PedestrianState,
-    Points,
     Pose,
     Sign,
     TrafficLight,
     VehicleState,
 )
-from caldrive.geometry import Polyline, box_corners, moved, polygon_distance, positions, to_local, wrap_angle
+from caldrive.geometry import Polyline, Posed, box_corners, moved, polygon_distance, wrap_angle
 
 IN_VIEW = 5.0  # m from which on a light stands too high to be seen
 REACTION, BRAKE = 0.2, 6.0  # s and m/s²: what stopping before a light takes
 STRIP = 1.3  # m to either side of the route: half a car and some room
+Thing = TypeVar("Thing", bound=Posed)
 FACING = math.radians(45)  # a sign or light counts for traffic that runs within this angle of the one it faces
 
 
@@ -46,22 +44,28 @@ class Area:
     left: float
     """Its left side, + to the left."""
 
-    def contains(self, points: Points) -> NDArray[np.bool_]:
-        """Which points (..., 2) of the axle's frame lie in it."""
-        x, y = points[..., 0], points[..., 1]
-        return np.asarray((x >= self.near) & (x <= self.far) & (y >= self.right) & (y <= self.left))
+    def among(self, axle: Pose, things: Iterable[Thing]) -> list[tuple[float, Thing]]:
+        """Things whose centres lie in it, and how far ahead of the axle each is (m)."""
+        c, s, x, y = math.cos(axle.heading), math.sin(axle.heading), axle.x, axle.y
+        inside = []
+        for thing in things:
+            dx, dy = thing.pose.x - x, thing.pose.y - y
+            ahead = c * dx + s * dy
+            if self.near <= ahead <= self.far and self.right <= c * dy - s * dx <= self.left:
+                inside.append((ahead, thing))
+        return inside
 
 
 # The table in supplement 2.1. Its text calls x the lateral axis, but its numbers are (forward, left).
 A1 = Area(near=7.4, far=14.0, right=-5.8, left=-0.8)
 A2 = Area(near=0.0, far=8.2, right=-2.0, left=2.0)
 A3 = Area(near=0.0, far=50.0, right=-1.6, left=1.6)
+A2_AND_A3 = Area(near=0.0, far=50.0, right=-2.0, left=2.0)  # around both
 
 
 def hazard_stop(axle: Pose, vehicles: Sequence[VehicleState], pedestrians: Sequence[PedestrianState]) -> bool:
     """Whether the centre of a car or a person lies in A2. axle: the middle of the ego's front axle."""
-    both = np.concatenate((positions(vehicles), positions(pedestrians)))
-    return bool(A2.contains(to_local(axle, both)).any())
+    return bool(A2.among(axle, vehicles) or A2.among(axle, pedestrians))
 
 
 def light_area(speed: float) -> Area:
@@ -76,24 +80,19 @@ def light_area(speed: float) -> Area:
 def red_light(axle: Pose, lights: Sequence[TrafficLight], speed: float) -> bool:
     """Whether a light that faces the ego and is not green stands in the area for this speed (m/s). Yellow counts, as it
     asks to stop."""
-    area = light_area(speed)
-    for light in lights:
-        if light.state is LightState.GREEN or abs(wrap_angle(light.pose.heading - axle.heading)) > FACING:
-            continue
-        if area.contains(to_local(axle, np.array([light.pose.x, light.pose.y]))):
-            return True
-    return False
+    inside = light_area(speed).among(axle, lights)
+    return any(light.state is not LightState.GREEN and _faces(light.pose, axle) for _, light in inside)
 
 
 def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
     """The limit on the nearest sign in A1 that faces the ego, in km/h."""
-    local = to_local(axle, positions(signs))
-    limits = [
-        (x, sign.limit)
-        for x, inside, sign in zip(local[:, 0], A1.contains(local), signs, strict=True)
-        if inside and abs(wrap_angle(sign.pose.heading - axle.heading)) <= FACING
-    ]
+    limits = [(ahead, sign.limit) for ahead, sign in A1.among(axle, signs) if _faces(sign.pose, axle)]
     return min(limits)[1] if limits else None
+
+
+def _faces(post: Pose, axle: Pose) -> bool:
+    """Whether what hangs on a post is meant for those who drive as the axle looks."""
+    return abs(wrap_angle(post.heading - axle.heading)) <= FACING
 
 
 def in_the_way(vehicle: VehicleState, route: Polyline, near: float) -> bool:
@@ -110,9 +109,11 @@ def in_the_way(vehicle: VehicleState, route: Polyline, near: float) -> bool:
 
 def vehicle_distance(ego: VehicleState, axle: Pose, vehicles: Sequence[VehicleState]) -> float:
     """Shortest distance between the boxes of the ego and the closest car whose centre is in A3, else 50 m."""
-    ahead = np.flatnonzero(A3.contains(to_local(axle, positions(vehicles))))
+    ahead = [vehicle for _, vehicle in A3.among(axle, vehicles)]
+    if not ahead:
+        return MAX_VEHICLE_DISTANCE
     own = box_corners(ego.pose, ego.length, ego.width)
-    boxes = [box_corners(v.pose, v.length, v.width) for v in (vehicles[int(i)] for i in ahead)]
+    boxes = [box_corners(vehicle.pose, vehicle.length, vehicle.width) for vehicle in ahead]
     return min([*(polygon_distance(own, box) for box in boxes), MAX_VEHICLE_DISTANCE])
 
 
@@ -141,14 +142,12 @@ def label(
     """
     axle = moved(ego.pose, forward=front_axle)
     angle, distance, s = to_line(axle, route, near)
-    local = to_local(axle, positions(vehicles))
-    ahead = A3.contains(local) | A2.contains(local)
-    vehicles = [v for v, seen in zip(vehicles, ahead, strict=True) if seen and in_the_way(v, route, s)]
+    vehicles = [vehicle for _, vehicle in A2_AND_A3.among(axle, vehicles) if in_the_way(vehicle, route, s)]
     return Affordances(
         hazard_stop=float(hazard_stop(axle, vehicles, pedestrians)),
         red_light=float(red_light(axle, lights, ego.speed)),
         speed_sign=speed_sign(axle, signs),
         vehicle_distance=vehicle_distance(ego, axle, vehicles),
         relative_angle=angle,
-        center_distance=float(np.clip(distance, -MAX_CENTER_DISTANCE, MAX_CENTER_DISTANCE)),
+        center_distance=min(max(distance, -MAX_CENTER_DISTANCE), MAX_CENTER_DISTANCE),
     )
