@@ -42,6 +42,12 @@ def interleaved_rows(images: Tensor) -> Tensor:
     return images.permute(0, 2, 3, 1).view(len(images), images.shape[2], -1)
 
 
+def gain_and_shift() -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """What a byte is multiplied by, and what is added then, to come to ImageNet's mean 0 and deviation 1; RGB."""
+    gain = tuple(1 / (255 * deviation) for deviation in DEVIATION)
+    return gain, tuple(-mean / deviation for mean, deviation in zip(MEAN, DEVIATION, strict=True))
+
+
 def normalise(images: Tensor) -> Tensor:
     """Images (N, 3, H, W) by `to_float` to ImageNet's mean 0 and deviation 1, in place."""
     mean, deviation = torch.tensor([MEAN]), torch.tensor([DEVIATION])

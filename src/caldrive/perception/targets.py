@@ -6,6 +6,7 @@ gives: logits (N, K) of K classes or scaled values (N, 1).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,6 +22,7 @@ from caldrive.datatypes import Affordances
 Outputs = Mapping[str, Tensor]
 Targets = Mapping[str, Tensor]
 ClassWeights = Mapping[str, Tensor]
+MOST_ODDS = 700.0  # logarithm of odds: e to the power of more is no number
 
 
 def encode(spec: AffordanceSpec, values: NDArray[Any]) -> Tensor:
@@ -53,13 +55,13 @@ def decode(outputs: Outputs) -> Affordances:
     """Outputs with N = 1 as affordances: probabilities by softmax, the likeliest sign, values in SI units."""
     values: dict[str, Any] = {}
     for spec in SPECS:
-        output = outputs[spec.name]
+        output: list[float] = outputs[spec.name][0].tolist()
         if spec.binary:
-            values[spec.name] = float(output[0].float().softmax(0)[1])
+            values[spec.name] = 1 / (1 + math.exp(min(output[0] - output[1], MOST_ODDS)))
         elif spec.discrete:
-            values[spec.name] = spec.classes[int(output[0].argmax())] or None
+            values[spec.name] = spec.classes[output.index(max(output))] or None
         else:
-            values[spec.name] = float(si_values(spec, output)[0])
+            values[spec.name] = min(max(output[0] * spec.scale, spec.low), spec.high)
     return Affordances(**values)
 
 

@@ -10,7 +10,6 @@ import torch
 from caldrive.datatypes import Command, Image, Observation
 from caldrive.interfaces import BadImage
 from caldrive.perception.camera_faults import FROZEN, TORN, TREMBLING, make_fault
-from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.watchdog import Watchdog
 from caldrive.perception.network.camera_check import REASONS
 
@@ -31,10 +30,10 @@ def see(image: Image, frame: int, speed: float = SPEED) -> Observation:
     return Observation(frame * DT, image, speed, Command.STRAIGHT)
 
 
-def look(watchdog: Watchdog, observation: Observation) -> str:
-    """What the watchdog says to a frame, nothing where it is content."""
+def look(watchdog: Watchdog, observation: Observation, outputs: torch.Tensor | None = None) -> str:
+    """What the watchdog says to a frame and the camera check's outputs, nothing where it is content."""
     try:
-        watchdog.look(observation, normalise(to_float(observation.image[None])))
+        watchdog.look(observation, outputs)
     except BadImage as error:
         return str(error)
     return ""
@@ -105,8 +104,8 @@ def test_an_old_image_is_noticed_and_one_without_a_time_is_new() -> None:
 
 def test_evidence_of_one_frame_is_not_enough_and_that_of_a_second_is() -> None:
     outputs = [FINE] * 5 + [SURE] + [FINE] * 9 + [SURE] * 10 + [FINE] * 10
-    watchdog = Watchdog(lambda images: outputs.pop(0), THRESHOLDS)
-    notes = [look(watchdog, see(road(k), k)) for k in range(len(outputs))]
+    watchdog = Watchdog(THRESHOLDS)
+    notes = [look(watchdog, see(road(k), k), output) for k, output in enumerate(outputs)]
     assert not any(notes[:20])
     assert "full of noise" in notes[24]
     assert not notes[-1]
@@ -115,16 +114,16 @@ def test_evidence_of_one_frame_is_not_enough_and_that_of_a_second_is() -> None:
 def test_evidence_has_to_fall_well_below_its_threshold_before_images_count_again() -> None:
     between = torch.tensor([[0.0, 3.0, *[-9.0] * (len(REASONS) - 1)]])
     outputs = [SURE] * 10 + [between] * 30
-    watchdog = Watchdog(lambda images: outputs.pop(0), THRESHOLDS)
-    assert all([look(watchdog, see(road(k), k)) for k in range(40)][10:])
+    watchdog = Watchdog(THRESHOLDS)
+    assert all([look(watchdog, see(road(k), k), output) for k, output in enumerate(outputs)][10:])
 
 
 def test_an_episode_begins_without_the_last_ones_evidence() -> None:
-    watchdog = Watchdog(lambda images: SURE, THRESHOLDS)
-    notes = [look(watchdog, see(road(k), k)) for k in range(10)]
+    watchdog = Watchdog(THRESHOLDS)
+    notes = [look(watchdog, see(road(k), k), SURE) for k in range(10)]
     watchdog.reset()
     assert notes[-1]
-    assert not look(watchdog, see(road(0), 0))
+    assert not look(watchdog, see(road(0), 0), SURE)
 
 
 @pytest.mark.parametrize(("speed", "backwards"), [(math.nan, False), (math.inf, False), (-3.0, False), (SPEED, True)])

@@ -9,9 +9,14 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from caldrive.datatypes import Image
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network.camera_check import CameraCheck
 from caldrive.perception.network.network import Network
 
 BackboneEngine = Callable[[Tensor], Tensor]  # normalised images (N, 3, H, W) to features (N, F)
+# An image (H, W, 3) in bytes to features (1, F), and the camera check's outputs (1, 1 + reasons).
+EyesEngine = Callable[[Image], tuple[Tensor, Tensor | None]]
 # Features (1, span, F) and a command (1,) to outputs (1, K) by affordance.
 BlocksEngine = Callable[[Tensor, Tensor], Mapping[str, Tensor]]
 
@@ -83,6 +88,25 @@ def backbone_engine(
     dtype = torch.bfloat16 if precision == "bf16" else torch.float32
     network.backbone.to(dtype)
     return lambda images: network.features(images.to(dtype)).float()
+
+
+def eyes_engine(
+    precision: str, network: Network, ranges: Sequence[float], check: CameraCheck | None, threads: int | None = None
+) -> EyesEngine:
+    """Backbone and camera check when driving: beside a backbone in integers the check, too, passes OpenVINO."""
+    if precision in INTEGERS:
+        from caldrive.perception.inference.openvino_engine import OpenVINOEyes
+
+        return OpenVINOEyes(
+            network, ranges, check, threads=threads or torch.get_num_threads(), bits=INTEGERS[precision]
+        )
+    backbone = backbone_engine(precision, network, ranges, threads)
+
+    def look(image: Image) -> tuple[Tensor, Tensor | None]:
+        images = normalise(to_float(image[None]))
+        return backbone(images), None if check is None else check(images)
+
+    return look
 
 
 def blocks_engine(precision: str, network: Network, threads: int | None = None) -> BlocksEngine:

@@ -17,7 +17,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from caldrive.datatypes import Image
+from caldrive.perception.images import gain_and_shift
 from caldrive.perception.network.backbone import Backbone
+from caldrive.perception.network.camera_check import CameraCheck
 from caldrive.perception.network.network import COMMANDS, Network, NodeGroup, TaskBlock
 
 # OpenVINO's converter, which nobody needs here, tells its makers over the network when it is imported. None in its
@@ -104,13 +107,7 @@ class Int8Backbone:
     def __init__(
         self, backbone: Backbone, ranges: Sequence[float], size: tuple[int, int], *, threads: int, bits: int = 8
     ) -> None:
-        if len(ranges) != len(backbone.convolutions()):
-            raise ValueError(
-                f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network again"
-            )
-        numbers = (torch.as_tensor(ranges), *backbone.state_dict().values())
-        if not all(bool(tensor.isfinite().all()) for tensor in numbers):
-            raise ValueError("found weights that are not numbers, wanted a trained network: train it again")
+        _require_trained(backbone, ranges)
         image = ops.parameter([1, 3, *size], np.float32)
         self._request = compiled([_backbone_graph(image, backbone, ranges, bits)], image, threads)
 
@@ -118,6 +115,51 @@ class Int8Backbone:
         """Normalised images (N, 3, H, W), which pass one at a time, to features (N, F)."""
         features = [self._request.infer([image], share_inputs=True)[0] for image in images.numpy()[:, None]]
         return torch.from_numpy(np.concatenate(features))
+
+
+def _require_trained(backbone: Backbone, ranges: Sequence[float]) -> None:
+    """Raises ValueError where the ranges are not this backbone's, or where they or its weights are not numbers."""
+    if len(ranges) != len(backbone.convolutions()):
+        raise ValueError(f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network again")
+    numbers = (torch.as_tensor(ranges), *backbone.state_dict().values())
+    if not all(bool(tensor.isfinite().all()) for tensor in numbers):
+        raise ValueError("found weights that are not numbers, wanted a trained network: train it again")
+
+
+def _check_graph(x: Any, check: CameraCheck) -> Any:
+    """The outputs (1, 1 + reasons) of a camera check on a normalised image (1, 3, H, W)."""
+    layers = list(check.layers)
+    for conv, norm in zip(layers[0:-1:3], layers[1:-1:3], strict=True):
+        assert isinstance(conv, nn.Conv2d)
+        strides, pads = list(conv.stride), [int(pad) for pad in conv.padding]
+        x = ops.convolution(x, constant(conv.weight), strides, pads, pads, dilations=[1, 1])
+        x = ops.relu(normalised(x, norm, 1, -1, 1, 1))
+    x = ops.reshape(x, ops.constant([1, -1]), False)
+    return _linear(ops.relu(_linear(x, check.head[0])), check.head[-1])
+
+
+class OpenVINOEyes:
+    """What looks at every image when driving: a trained backbone in integers, and the camera check. bits: of a weight,
+    see `Int8Backbone`. Raises ValueError as that does."""
+
+    def __init__(
+        self, network: Network, ranges: Sequence[float], check: CameraCheck | None, *, threads: int, bits: int
+    ) -> None:
+        _require_trained(network.backbone, ranges)
+        image = ops.parameter([1, *network.config.image_size, 3], np.uint8)
+        gain, shift = (np.array(values, np.float32) for values in gain_and_shift())
+        x = ops.add(ops.multiply(ops.convert(image, "f32"), ops.constant(gain)), ops.constant(shift))
+        x = ops.transpose(x, ops.constant([0, 3, 1, 2]))
+        outputs = [_backbone_graph(x, network.backbone, ranges, bits)]
+        if check is not None:
+            outputs.append(_check_graph(x, check))
+        self._request = compiled(outputs, image, threads)
+
+    def __call__(self, image: Image) -> tuple[Tensor, Tensor | None]:
+        """An image (H, W, 3) to features (1, F) and the check's outputs (1, 1 + reasons), None without one."""
+        outputs = self._request.infer([np.ascontiguousarray(image[None])], share_inputs=True)
+        features, *checked = (torch.from_numpy(outputs[k]) for k in range(len(outputs)))
+        return features, checked[0] if checked else None
 
 
 LAYERS = ("dense", "tconv")  # those that have a graph here

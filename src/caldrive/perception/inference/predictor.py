@@ -9,10 +9,10 @@ from torch import Tensor
 
 from caldrive.datatypes import Affordances, Observation
 from caldrive.interfaces import BadImage
-from caldrive.perception.images import check_image, normalise, to_float
-from caldrive.perception.inference.engines import INTEGERS, backbone_engine, blocks_engine, driving_precision
+from caldrive.perception.images import check_image
+from caldrive.perception.inference.engines import INTEGERS, blocks_engine, driving_precision, eyes_engine
 from caldrive.perception.inference.watchdog import Watchdog
-from caldrive.perception.network.camera_check import load_camera_check
+from caldrive.perception.network.camera_check import CameraCheck, load_camera_check
 from caldrive.perception.network.checkpoint import CheckpointInfo, load_network
 from caldrive.perception.network.network import COMMANDS, Network
 from caldrive.perception.targets import decode
@@ -35,17 +35,19 @@ class NetworkPerception:
         *,
         watchdog: bool = True,
     ) -> None:
-        check = None
+        check: CameraCheck | None = None
+        thresholds: tuple[float, ...] = ()
         if isinstance(network, Network):
             info = CheckpointInfo(network.config)
         else:
-            check = load_camera_check(network)
+            if watchdog and (known := load_camera_check(network)) is not None:
+                check, thresholds = known
             network, info = load_network(network)
-        self._watchdog = Watchdog(*(check or ())) if watchdog else None
+        self._watchdog = Watchdog(thresholds) if watchdog else None
         self.network, precision = network.eval(), driving_precision(precision, info.ranges)
         if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
             torch.set_num_threads(1 if precision in INTEGERS else threads)
-        self._backbone = backbone_engine(precision, network, info.ranges, threads)
+        self._eyes = eyes_engine(precision, network, info.ranges, check, threads)
         self._blocks = blocks_engine(precision, network, threads)
         self._history: Tensor | None = None  # (1, span, F)
 
@@ -59,10 +61,10 @@ class NetworkPerception:
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
         check_image(observation.image, self.network.config.image_size)
-        images = normalise(to_float(observation.image[None]))
+        features, checked = self._eyes(observation.image)
         if self._watchdog is not None:
-            self._watchdog.look(observation, images)
-        features = self._backbone(images)[:, None]  # (1, 1, F)
+            self._watchdog.look(observation, checked)
+        features = features[:, None]  # (1, 1, F)
         if not bool(features.isfinite().all()):
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:

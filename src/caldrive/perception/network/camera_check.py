@@ -40,6 +40,7 @@ REASONS: dict[str, tuple[str, ...]] = {
 # Frames over which the evidence for each is averaged. On the opposite side of the road a car sees what mirrors show,
 # and it needs some seconds to come back.
 WINDOWS = tuple(60 if name == "mirrored" else 10 for name in REASONS)
+COUNT = np.arange(max(WINDOWS), 0, -1)[:, None] <= WINDOWS  # which of the last frames do, by reason; the newest is last
 KEY = "camera_check"  # of its thresholds in the header of a network's file
 CHANNELS = (16, 24, 32, 48)
 NODES, DROPOUT = 32, 0.3
@@ -84,7 +85,9 @@ def evidence(outputs: Tensor) -> Tensor:
 def averaged(odds: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """For each reason the mean (reasons,) of its evidence (T, reasons) over the last frames of its window; before the
     first frame there is no evidence."""
-    return np.array([odds[-window:, k].sum(dtype=np.float64) / window for k, window in enumerate(WINDOWS)])
+    recent = odds[-len(COUNT) :]
+    sums: NDArray[np.float64] = (recent * COUNT[-len(recent) :]).sum(axis=0, dtype=np.float64)
+    return sums / WINDOWS
 
 
 def add_camera_check(path: Path, check: CameraCheck, thresholds: Sequence[float]) -> None:
