@@ -25,7 +25,7 @@ from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.timing import Stopwatch
 from caldrive.visualization.hud import SIZE
 from scripts.every_verb import COMMANDS, words
-from tests.command_line import run_json
+from tests.command_line import refusal, run_json
 
 DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]
 PREDICTED = ("hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance")
@@ -141,6 +141,28 @@ def test_speed_world_says_where_the_time_goes() -> None:
     assert found["first_frame"] > 0
 
 
+def test_speed_is_compared_with_an_earlier_run_on_this_processor_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("speed", "world", "--town", "town02", "--cars", "0", "--people", "0", "--steps", "3")
+    found, file = run_json(*options), tmp_path / "before.json"
+    file.write_text(json.dumps(found | {"median_ms": 2 * found["median_ms"]}))
+    again = run_json(*options, "--against", str(file))
+    assert again["ratios"]["whole step"] == pytest.approx(2 * found["median_ms"] / again["median_ms"])
+    assert again["ratios"].keys() >= {"camera", "steps a second"}
+    file.write_text(json.dumps(found | {"processor": "another"}))
+    assert "found a measurement of another" in refusal(capsys, *options, "--against", str(file))
+    file.write_text("{}")
+    assert "no measurement" in refusal(capsys, *options, "--against", str(file))
+
+
+def test_three_cameras_and_two_worlds_are_measured() -> None:
+    few = ("--town", "town02", "--cars", "0", "--people", "0", "--steps", "3")
+    one, three = (run_json("speed", "world", *few, "--cameras", n)["parts_ms"]["camera"] for n in ("1", "3"))
+    assert three > one
+    assert run_json("speed", "world", *few, "--workers", "2")["memory_mb"] > 100
+
+
 def test_what_no_part_takes_is_the_rest() -> None:
     watch = Stopwatch()
     for _ in range(3):
@@ -190,7 +212,7 @@ def test_runs_that_differ_end_with_1(monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
     code = (
         "import sys\nfrom caldrive.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
-        "print('loaded', *{'torch', 'libsumo', 'moderngl', 'numpy', 'av'} & sys.modules.keys())"
+        "print('loaded', *{'torch', 'libsumo', 'numba', 'numpy', 'av'} & sys.modules.keys())"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert all(verb in shown for verb in ("drive", "see", "town", "speed", "determinism"))

@@ -55,16 +55,22 @@ def drive_table(report: DriveReport) -> Group:
     return Group(table, Text(summary), *video, Text(f"episodes: {report.files[0].parent}"))
 
 
-def world_table(speed: WorldTiming) -> Group:
-    """Where a step's time goes, the longest first."""
-    table = Table("part of a step", "median ms", "share", box=SIMPLE_HEAD)
+def world_table(speed: WorldTiming, ratios: Mapping[str, float]) -> Group:
+    """Where a step's time goes, the longest first. ratios: how many times as fast as before, by part."""
+    columns = ("part of a step", "median ms", "share", *(("times as fast",) if ratios else ()))
+    table = Table(*columns, box=SIMPLE_HEAD)
     for column in table.columns[1:]:
         column.justify = "right"
+
+    def ratio(name: str) -> tuple[str, ...]:
+        return (f"{ratios[name]:.2f}" if name in ratios else "",) if ratios else ()
+
     for name, value in sorted(speed.parts_ms.items(), key=lambda item: -item[1]):
-        table.add_row(name, f"{value:.3f}", f"{100 * value / speed.median_ms:.0f} %")
-    table.add_row("whole step", f"{speed.median_ms:.3f}", "", style="bold")
+        table.add_row(name, f"{value:.3f}", f"{100 * value / speed.median_ms:.0f} %", *ratio(name))
+    table.add_row("whole step", f"{speed.median_ms:.3f}", "", *ratio("whole step"), style="bold")
     first = f"first frame after {speed.first_frame:.2f} s, and {speed.imports:.2f} s to load the libraries before it"
-    return Group(table, Text(f"{speed.steps_per_second:.0f} camera steps a second"), Text(first))
+    rate = f"{speed.steps_per_second:.0f} camera steps a second on {speed.processor}"
+    return Group(table, Text(rate), Text(first), Text(f"{speed.memory_mb:.0f} MB of memory at most"))
 
 
 def counts_table(folder: Path, counts: dict[str, dict[str, int]]) -> Group:

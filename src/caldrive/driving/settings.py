@@ -74,15 +74,19 @@ class WorldSpeedSettings:
     """Other cars."""
     people: int = 50
     """Pedestrians."""
+    cameras: Literal[1, 3] = 1
+    """Pictures of each step: the agent's camera, or the three of a recording."""
+    workers: int = 1
+    """Worlds at the same time, each in a process of its own."""
     steps: int = 600
-    """How many steps to measure."""
+    """How many steps to measure, in each of them."""
     seed: int = 0
     """Decides everything random."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AgentSpeedSettings(AgentSettings):
-    """Milliseconds from image to control."""
+    """Milliseconds from image to control, while the agent drives among others in town01."""
 
     steps: int = 300
     """How many images to measure."""
