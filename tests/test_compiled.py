@@ -68,6 +68,16 @@ def test_the_same_bytes_come_out_of_code_for_another_processor(tmp_path: Path) -
     assert said[0] == said[1]
 
 
+def test_a_disk_without_room_for_the_code_is_no_obstacle(home: Path) -> None:
+    resource_limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
+    environment = os.environ | {"XDG_CACHE_HOME": str(home)}
+    done = subprocess.run(
+        [sys.executable, "-c", resource_limit + PROGRAM], env=environment, stdout=subprocess.PIPE, check=True
+    )
+    assert done.stdout == b"True\n"
+    assert not list(home.rglob("*.nbc"))
+
+
 def test_other_sources_have_another_folder_and_old_ones_are_removed(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

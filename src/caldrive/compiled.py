@@ -2,7 +2,8 @@
 
 Nothing is reordered and no two operations are joined into one: the same numbers come out on every processor. The
 machine code is kept in a folder of the user's, one for each state of the sources, so that only the first run on a
-machine compiles. numba by itself would notice changes of a function's own file only, not of what is inlined.
+machine compiles. numba by itself would notice changes of a function's own file only, not of what is inlined. It
+unpickles what lies there, so the folder is the user's alone.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import config, event
+from numba.core import caching, config, event
 from numpy.typing import NDArray
 
 from caldrive.user_cache import own_folders
@@ -34,10 +35,11 @@ f32, i32 = np.float32, np.int32  # types of numbers in compiled code: mixed ones
 def compiled(function: Function) -> Function:
     """The function, compiled when it is first called. Indices out of range are not noticed. It makes no arrays, as it
     does not count who holds one: that would take most of its time."""
-    folder = code_folder()
-    with _kept_in(folder):
-        made: Function = numba.njit(cache=folder is not None, **WITHOUT_COUNTS)(function)
-    return made
+    made: Any = numba.njit(**WITHOUT_COUNTS)(function)
+    if (folder := code_folder()) is not None:
+        with _kept_in(folder):
+            made._cache = _Code(function)  # type: ignore[no-untyped-call]
+    return cast("Function", made)
 
 
 def inlined(function: Function) -> Function:
@@ -68,11 +70,33 @@ def _state_of_sources() -> str:
     return hashlib.sha256(b"".join(hashlib.sha256(path.read_bytes()).digest() for path in sources)).hexdigest()[:16]
 
 
+class _Place(caching.UserProvidedCacheLocator):
+    """Where the code of a function lies: by its place in the package, wherever that is installed."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        return Path(py_file).parent.name
+
+
+class _Kept(caching.CompileResultCacheImpl):
+    _locator_classes: ClassVar[list[type[object]]] = [_Place]  # type: ignore[misc]
+
+
+class _Code(caching.FunctionCache):
+    """The kept code of a function."""
+
+    _impl_class = _Kept
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with suppress(OSError):  # a full disk: the next run compiles again
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+
 @contextmanager
-def _kept_in(folder: Path | None) -> Iterator[None]:
+def _kept_in(folder: Path) -> Iterator[None]:
     """What is decorated meanwhile is kept in the folder; numba asks for it then."""
     before = vars(config)["CACHE_DIR"]
-    vars(config)["CACHE_DIR"] = str(folder or "")
+    vars(config)["CACHE_DIR"] = str(folder)
     try:
         yield
     finally:
@@ -87,7 +111,8 @@ class _Announcement(event.Listener):
     def on_start(self, event: Any) -> None:
         if not self.made:
             _Announcement.made = True
-            print("compiling the camera for this processor, once: this takes half a minute", file=sys.stderr)
+            with suppress(OSError, ValueError):  # nobody may listen any more
+                print("compiling the camera for this processor, once: this takes half a minute", file=sys.stderr)
 
     def on_end(self, event: Any) -> None:
         """Nothing to tell."""
