@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,6 +20,7 @@ from caldrive.world.traffic.collisions import Obstacle, half_diagonal
 from caldrive.world.truth.ground_raster import GroundRaster
 
 SIGN_BESIDE = (-7.0, -1.0)  # m left of the route where a sign that counts for it stands
+CELL = 8.0  # m: a side of the squares that what is near is found for
 SAME_WAY = 0.5  # rad at most between the route and the traffic that such a sign faces
 
 
@@ -32,11 +34,26 @@ class Obstacles:
         ]
         self._at = positions(self._boxes)
         self._reach = np.array([half_diagonal(box) for box in self._boxes])
+        self._last: tuple[tuple[int, int, float], list[tuple[Obstacle, float]]] | None = None
 
     def near(self, here: Pose, reach: float) -> list[Obstacle]:
         """Those that something of this reach (m) around here may touch."""
-        distance = np.hypot(*(self._at - (here.x, here.y)).T) - self._reach
-        return [self._boxes[i] for i in np.flatnonzero(distance < reach)]
+        around = self._around(math.floor(here.x / CELL), math.floor(here.y / CELL), reach)
+        return [
+            box
+            for box, radius in around
+            if math.hypot(box.pose.x - here.x, box.pose.y - here.y) - radius < reach
+        ]  # fmt: skip
+
+    def _around(self, column: int, row: int, reach: float) -> list[tuple[Obstacle, float]]:
+        """Those that something of this reach anywhere in a square of CELL m may touch, each with its own reach; the
+        last square's are remembered."""
+        if self._last is None or self._last[0] != (column, row, reach):
+            middle = CELL * (column + 0.5), CELL * (row + 0.5)
+            distance = np.hypot(*(self._at - middle).T) - self._reach
+            within = np.flatnonzero(distance < reach + CELL).tolist()
+            self._last = (column, row, reach), [(self._boxes[i], float(self._reach[i])) for i in within]
+        return self._last[1]
 
 
 @dataclass(frozen=True, eq=False)
