@@ -139,10 +139,10 @@ class TrafficLights:
         if self._detectors is None:
             return
         waiting, occupied = self._detectors.look(np.array([(c.pose.x, c.pose.y, c.pose.heading) for c in cars]))
-        first = 0
+        first, waits = 0, waiting.tolist()
         for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
             last = first + len(junction.posts)
-            phase = next_phase(junction.phase, time, waiting[first:last].tolist(), busy)
+            phase = next_phase(junction.phase, time, waits[first:last], busy)
             if phase is not junction.phase:
                 junction.change(phase)
             first = last
