@@ -21,8 +21,7 @@ from caldrive.driving.speed import start_drive
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering import overlays, picture
 from caldrive.world.rendering.camera import CameraRig, SceneState
-from caldrive.world.rendering.fragments import seen
-from caldrive.world.rendering.picture import SAMPLES
+from caldrive.world.rendering.fragments import SAMPLES, seen
 from caldrive.world.rendering.pinhole import camera_on
 from caldrive.world.rendering.rasteriser import rasterise
 from caldrive.world.rendering.spots import Scene

@@ -15,7 +15,8 @@ from caldrive import compiled
 
 PROGRAM = """
 import numpy as np
-from caldrive.world.traffic.gap_acceptance import boxes_of, may_walk
+from caldrive.geometry import boxes_of
+from caldrive.world.traffic.gap_acceptance import may_walk
 print(may_walk(np.zeros(2), (0.0, 1.0), 1.0, boxes_of([])))
 """
 

@@ -56,9 +56,9 @@ def code_folder() -> Path | None:
             made = folder / f"compiled-{_state_of_sources()}"
             made.mkdir(mode=0o700, exist_ok=True)
             made.touch()
-            by_age = sorted(folder.glob("compiled-*"), key=lambda path: path.stat().st_mtime)
-            for old in by_age[:-KEPT]:
-                shutil.rmtree(old, ignore_errors=True)
+            with suppress(OSError):  # another process may remove them, too
+                for old in sorted(folder.glob("compiled-*"), key=lambda path: path.stat().st_mtime)[:-KEPT]:
+                    shutil.rmtree(old, ignore_errors=True)
             return made
     return None
 
@@ -112,7 +112,7 @@ class _Announcement(event.Listener):
         if not self.made:
             _Announcement.made = True
             with suppress(OSError, ValueError):  # nobody may listen any more
-                print("compiling the camera for this processor, once: this takes half a minute", file=sys.stderr)
+                print("compiling for this processor, once: this takes up to a minute", file=sys.stderr)
 
     def on_end(self, event: Any) -> None:
         """Nothing to tell."""

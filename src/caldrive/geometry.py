@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.datatypes import Points, Pose
+from caldrive.datatypes import Points, Pose, VehicleState
 
 
 def wrap_angle(angle: float) -> float:
@@ -46,6 +46,12 @@ class Posed(Protocol):
 def positions(things: Iterable[Posed]) -> Points:
     """Where things stand (N, 2), m."""
     return np.array([(thing.pose.x, thing.pose.y) for thing in things], dtype=float).reshape(-1, 2)
+
+
+def boxes_of(cars: Iterable[VehicleState]) -> NDArray[np.float64]:
+    """Cars as compiled code reads them (M, 5): x, y, heading, speed, half length."""
+    rows = [(car.pose.x, car.pose.y, car.pose.heading, car.speed, car.length / 2) for car in cars]
+    return np.array(rows, dtype=float).reshape(-1, 5)
 
 
 def moved(pose: Pose, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> Pose:

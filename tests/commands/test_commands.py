@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,12 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.cli import _print, main, parse
 from caldrive.commands import VERBS
 from caldrive.commands.answer import Answer
-from caldrive.datatypes import Command, Observation
+from caldrive.datatypes import CameraConfig, Command, Image, Observation
 from caldrive.driving.determinism import Comparison, EpisodeDigests, compare
 from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.timing import Stopwatch
 from caldrive.visualization.hud import SIZE
+from caldrive.world.embedded import EmbeddedWorld
 from scripts.every_verb import COMMANDS, words
 from tests.command_line import refusal, run_json
 
@@ -152,14 +154,25 @@ def test_speed_is_compared_with_an_earlier_run_on_this_processor_only(
     assert again["ratios"].keys() >= {"camera", "steps a second"}
     file.write_text(json.dumps(found | {"processor": "another"}))
     assert "found a measurement of another" in refusal(capsys, *options, "--against", str(file))
+    file.write_text(json.dumps(found))
+    assert "0 cars" in refusal(capsys, *options, "--cars", "3", "--against", str(file))
     file.write_text("{}")
     assert "no measurement" in refusal(capsys, *options, "--against", str(file))
 
 
-def test_three_cameras_and_two_worlds_are_measured() -> None:
+def test_three_cameras_and_two_worlds_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     few = ("--town", "town02", "--cars", "0", "--people", "0", "--steps", "3")
-    one, three = (run_json("speed", "world", *few, "--cameras", n)["parts_ms"]["camera"] for n in ("1", "3"))
-    assert three > one
+    pictures, images = [0], EmbeddedWorld.images
+
+    def counted(world: EmbeddedWorld, mounts: Sequence[CameraConfig]) -> list[Image]:
+        pictures[-1] += len(mounts)
+        return images(world, mounts)
+
+    monkeypatch.setattr(EmbeddedWorld, "images", counted)
+    for cameras in ("1", "3"):
+        run_json("speed", "world", *few, "--cameras", cameras)
+        pictures.append(0)
+    assert pictures[1] - 1 == 3 * (pictures[0] - 1)  # the first is taken before the drive
     assert run_json("speed", "world", *few, "--workers", "2")["memory_mb"] > 100
 
 

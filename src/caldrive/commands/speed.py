@@ -31,18 +31,17 @@ class WorldSpeed(WorldSpeedSettings, Compared):
 
     def run(self, progress: Progress) -> Answer:
         """Measures; answers with milliseconds for each part of a step."""
-        from caldrive.driving.speed import WorldTiming, measure_world
+        from caldrive.driving.speed import WorldTiming, measure_world, scene_of
 
         before = None if self.against is None else earlier(self.against, WorldTiming)
+        if before is not None and before.scene != scene_of(self):
+            raise ValueError(
+                f"found a measurement of {before.scene}, wanted one of {scene_of(self)}: give the options that it had"
+            )
         speed = measure_world(self, progress)
         from caldrive.commands.tables import world_table
 
-        ratios = {}
-        if before is not None:
-            parts = {name: before.parts_ms[name] / ms for name, ms in speed.parts_ms.items() if name in before.parts_ms}
-            ratios = parts | {"whole step": before.median_ms / speed.median_ms}
-            ratios["steps a second"] = speed.steps_per_second / before.steps_per_second
-            _require_same(before.processor, speed.processor)
+        ratios = {} if before is None else before.over(speed)
         return Answer(asdict(speed) | ({"ratios": ratios} if ratios else {}), world_table(speed, ratios))
 
 
@@ -62,28 +61,28 @@ class AgentSpeed(AgentSpeedSettings, Compared):
             f"({speed.width} x {speed.height}, {speed.processor})"
         )
         if before is not None:
-            _require_same(before.processor, speed.processor)
             values["ratios"] = {"median": before.median_ms / speed.median_ms}
             said += f"; {before.median_ms / speed.median_ms:.2f} times as fast as before"
         return Answer(values, said)
 
 
 def earlier(path: Path, kind: type[Timing]) -> Timing:
-    """A measurement that --json printed. Raises ValueError where the file is none."""
+    """A measurement that --json printed. Raises ValueError where the file is none, or of another processor."""
+    from caldrive.driving.speed import processor_name
+
     try:
-        return read_json(path.read_bytes(), kind)
+        before = read_json(path.read_bytes(), kind)
+        if before.median_ms <= 0:
+            raise ValueError("its steps took no time")
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ValueError(
             f"found in {path} no measurement ({reason}), wanted what the same command printed with --json: "
             "type caldrive speed world --json > FILE"
         ) from error
-
-
-def _require_same(before: str, now: str) -> None:
-    """Raises ValueError for measurements of two processors."""
-    if before != now:
+    if before.processor != processor_name():
         raise ValueError(
-            f"found a measurement of {before}, and this is {now}: only runs on one machine can be compared; "
-            "leave out --against"
+            f"found a measurement of {before.processor}, and this is {processor_name()}: only runs on one machine can "
+            "be compared; leave out --against"
         )
+    return before

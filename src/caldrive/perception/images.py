@@ -50,8 +50,8 @@ def gain_and_shift() -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 def normalise(images: Tensor) -> Tensor:
     """Images (N, 3, H, W) by `to_float` to ImageNet's mean 0 and deviation 1, in place."""
-    mean, deviation = torch.tensor([MEAN]), torch.tensor([DEVIATION])
-    gain, shift = 1 / deviation, -mean / deviation
+    of_bytes, shift = (torch.tensor([values]) for values in gain_and_shift())
+    gain = 255 * of_bytes
     width = images.shape[3]
     interleaved_rows(images).mul_(gain.repeat(1, width)[:, None]).add_(shift.repeat(1, width)[:, None])
     return images

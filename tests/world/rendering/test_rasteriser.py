@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from caldrive.world.rendering.fragments import SIDE, fragments_of, make_planes, room_for, seen
+from caldrive.world.rendering.fragments import SAMPLES, fragments_of, make_planes, room_for, seen
 from caldrive.world.rendering.rasteriser import NEAR, POLYGON, rasterise
 
 ROWS, COLUMNS = 24, 32
@@ -75,9 +75,9 @@ def test_what_is_seen_is_numbered_anew() -> None:
 
 def test_a_pixels_fragments_make_it_up() -> None:
     numbers, _ = shown(*wall(3.0), [(-1, -0.93, 1.0), (-0.3, 0.7, 1.0), (0.9, -0.8, 1.0)])
-    pixels = ROWS // SIDE * COLUMNS // SIDE
+    pixels = ROWS // SAMPLES * COLUMNS // SAMPLES
     room = room_for(pixels)
-    n = fragments_of(numbers, 0, ROWS // SIDE, room)
+    n = fragments_of(numbers, 0, ROWS // SAMPLES, room)
     shares = np.bincount(room.pixel[:n], weights=room.share[:n], minlength=pixels)
     assert shares == pytest.approx(1.0)
     assert n > pixels

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from caldrive.datatypes import Pose, VehicleState
-from caldrive.world.traffic.gap_acceptance import boxes_of, may_walk
+from caldrive.geometry import boxes_of
+from caldrive.world.traffic.gap_acceptance import may_walk
 
 
 def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float = 1.2) -> bool:

@@ -13,9 +13,10 @@ from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState,
 from caldrive.world.rendering.actor_meshes import actor_meshes
 from caldrive.world.rendering.actors import seen_actors
 from caldrive.world.rendering.atmosphere import Atmosphere
+from caldrive.world.rendering.fragments import SAMPLES
 from caldrive.world.rendering.occlusion import Cells, OcclusionMap
 from caldrive.world.rendering.overlays import Lamps
-from caldrive.world.rendering.picture import SAMPLES, Canvas, Drawn, Overlays
+from caldrive.world.rendering.picture import Canvas, Drawn, Overlays
 from caldrive.world.rendering.pinhole import PinholeCamera, camera_on
 from caldrive.world.rendering.spots import Scene
 from caldrive.world.rendering.tiles import Faces, ViewCell

@@ -12,7 +12,7 @@ import numpy as np
 
 from caldrive.compiled import Floats, Integers, compiled, f32, i32
 
-SIDE = 2  # samples of a pixel along each side
+SAMPLES = 2  # samples of a pixel along each side
 QUARTER, HALF, ONE = f32(0.25), f32(0.5), f32(1.0)
 TAKEN = -2  # a sample that another fragment has counted
 
@@ -36,7 +36,7 @@ class Fragments(NamedTuple):
 
 def room_for(pixels: int) -> Fragments:
     """Room for the fragments of so many pixels."""
-    n = SIDE * SIDE * pixels
+    n = SAMPLES * SAMPLES * pixels
     column, row, share = (np.empty(n, np.float32) for _ in range(3))
     return Fragments(column, row, np.empty(n, np.int32), np.empty(n, np.int32), share, np.empty(4, np.int32))
 

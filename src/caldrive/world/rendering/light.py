@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.compiled import Floats, Integers, f32, inlined
+from caldrive.world.rendering.texturing import BITS, STEPS
 from caldrive.world.scene.shadows import TALLEST_SHADOW, Bounds
 from caldrive.world.scene.weather import Lighting
 
 ZERO, ONE = f32(0.0), f32(1.0)
-BITS = 6
-STEPS = 1 << BITS  # between two texels
 TWO_BYTES = 0xFF00FF
 METRES = f32(TALLEST_SHADOW / 255 / STEPS**2)
 

@@ -104,17 +104,15 @@ def draw_shadows(picture: Floats, depths: Floats, shadows: Rows, matrix: Floats,
                 values[k, 0], values[k, 1], values[k, 2], values[k, 3] = x, y, ground_x, ground_y
         make_planes(quad, values, picture.shape[1], picture.shape[0], planes)
         for h in range(_covered(room, depths)):
-            row, column = hits[h, 0], hits[h, 1]
-            spot = Spot(f32(column), f32(row), ONE, WHOLE * f32(hits[h, 2]))
-            w = ONE / at(planes, 0, spot)
-            x, y = at(planes, 1, spot) * w, at(planes, 2, spot) * w
+            row, column, spot = hits[h, 0], hits[h, 1], _spot_of(hits[h], planes)
+            x, y = at(planes, 1, spot) * spot.w, at(planes, 2, spot) * spot.w
             swept = _inside(x, y, shadow[4], shadow[5], sweep_x, sweep_y) * length * f32(4.0)
             swept = min(max(swept, ZERO), ONE) * direct / (direct + sky)
-            swept *= sunshine(light, at(planes, 3, spot) * w, at(planes, 4, spot) * w, f32(0.1), 0)
+            swept *= sunshine(light, at(planes, 3, spot) * spot.w, at(planes, 4, spot) * spot.w, f32(0.1), 0)
             beyond_x = max(abs(x) - shadow[4] + f32(0.15), ZERO)
             beyond_y = max(abs(y) - shadow[5] + f32(0.15), ZERO)
             under = shadow[6] * max(ONE - (beyond_x * beyond_x + beyond_y * beyond_y) * f32(5.0), ZERO)
-            left = ONE - spot.share * max(swept, under) * clarity(light, w)
+            left = ONE - spot.share * max(swept, under) * clarity(light, spot.w)
             for c in range(3):
                 picture[row, column, c] *= left
 
@@ -160,10 +158,8 @@ def draw_lamps(picture: Floats, depths: Floats, lamps: Rows, view: View, room: S
                 values[k, 0], values[k, 1] = right, up
         make_planes(quad, values, picture.shape[1], picture.shape[0], planes)
         for h in range(_covered(room, depths)):
-            row, column = hits[h, 0], hits[h, 1]
-            spot = Spot(f32(column), f32(row), ONE, WHOLE * f32(hits[h, 2]))
-            w = ONE / at(planes, 0, spot)
-            x, y = at(planes, 1, spot) * w, at(planes, 2, spot) * w
+            row, column, spot = hits[h, 0], hits[h, 1], _spot_of(hits[h], planes)
+            x, y = at(planes, 1, spot) * spot.w, at(planes, 2, spot) * spot.w
             radii = f32(HALO) * np.sqrt(x * x + y * y)
             rest = max(ONE - radii / f32(HALO), ZERO)
             core = min(max((f32(1.05) - radii) * f32(5.0), ZERO), ONE) if lamp[7] == ZERO else ZERO
@@ -202,6 +198,13 @@ def _drop(drops: Floats, u: np.float32, v: np.float32, size: int) -> np.float32:
     low, high = a + right * (b - a), c + right * (d - c)
     between: np.float32 = low + up * (high - low)
     return between
+
+
+@inlined
+def _spot_of(hit: Integers, planes: Floats) -> Spot:
+    """Where a quadrilateral is seen, by a row of `Scratch.hits`."""
+    spot = Spot(f32(hit[1]), f32(hit[0]), ONE, WHOLE * f32(hit[2]))
+    return Spot(spot.column, spot.row, ONE / at(planes, 0, spot), spot.share)
 
 
 @inlined

@@ -33,7 +33,6 @@ from caldrive.world.rendering.surfaces import (
 from caldrive.world.rendering.tiles import Faces
 from caldrive.world.rendering.town_mesh import TownVertices, project_town, road_values, standing_values
 
-SAMPLES = 2  # of a pixel along each side
 OF_TOWN, OF_SKY = -1, -2  # in the place of an actor
 ROAD_CLASS, LINE_CLASS = int(Semantic.ROAD), int(Semantic.LINE)
 ZERO, HALF, ONE = f32(0.0), f32(0.5), f32(1.0)
@@ -106,7 +105,7 @@ class Canvas:
         )  # fmt: skip
 
     def image(self, drawn: Drawn, scene: Scene, over: Overlays) -> Image:
-        """A picture (H, W, 3) of a town. The canvas has SAMPLES."""
+        """A picture (H, W, 3) of a town. The canvas has SAMPLES, see `fragments`."""
         image = np.empty(self.sheet.colors.shape, np.uint8)
         _image(self.sheet, self._room_of(drawn), drawn, scene, over, image)
         return image

@@ -4,13 +4,12 @@ them, or has passed, or is slow; in front of a fast car they wait."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.compiled import compiled, inlined
-from caldrive.datatypes import Points, VehicleState
+from caldrive.datatypes import Points
 
 CORRIDOR = 2.05  # m to either side of a car's middle
 STOPPABLE_SPEED = 9.2  # m/s: from it a full brake stops within the hazard area A2
@@ -23,16 +22,10 @@ PASSED = 1.0  # m behind a car's rear from which on it has passed
 Floats = NDArray[np.float64]
 
 
-def boxes_of(cars: Sequence[VehicleState]) -> Floats:
-    """Cars as compiled code reads them (M, 5): x, y, heading, speed, half length."""
-    rows = [(car.pose.x, car.pose.y, car.pose.heading, car.speed, car.length / 2) for car in cars]
-    return np.array(rows, dtype=float).reshape(-1, 5)
-
-
 @compiled
 def may_walk(position: Points, way: tuple[float, float], pace: float, boxes: Floats) -> bool:
     """Whether somebody (2,) may walk a stretch (x, y in m) at a pace (m/s): who enters no corridor of a car that by
-    then is beside them or can neither stop nor pass. boxes: see `boxes_of`."""
+    then is beside them or can neither stop nor pass. boxes: see `geometry.boxes_of`."""
     for car in range(len(boxes)):
         heading, speed, half = boxes[car, 2], boxes[car, 3], boxes[car, 4]
         dx, dy, u, v = position[0] - boxes[car, 0], position[1] - boxes[car, 1], math.cos(heading), math.sin(heading)

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from caldrive.compiled import compiled, inlined
 from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
+from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.traffic.gap_acceptance import boxes_of, may_walk
+from caldrive.world.traffic.gap_acceptance import may_walk
 from caldrive.world.traffic.sidewalks import Crossing, Floats, Loops, find_sidewalks, require_room
 
 MEAN_WALK_BETWEEN_CROSSINGS = 60.0  # s
@@ -149,7 +150,7 @@ def cross_on(
     walkers: Walkers, who: NDArray[np.int64], dt: float, boxes: Floats, arrived: Flags, at_kerb: Flags
 ) -> None:
     """Those who cross go on for dt seconds, or wait for a car. Writes who arrives, and who is still at the kerb (len
-    (who),). boxes: see `boxes_of`."""
+    (who),). boxes: see `geometry.boxes_of`."""
     for i in range(len(who)):
         k = who[i]
         position, pace = walkers.position[k], walkers.pace[k]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from caldrive.compiled import compiled
 from caldrive.datatypes import LightState, PedestrianState, Points, VehicleState
-from caldrive.geometry import positions
+from caldrive.geometry import boxes_of, positions
 from caldrive.world.traffic.traffic_lights import Phase, TrafficLights
 
 _LETTER = {LightState.GREEN: "G", LightState.YELLOW: "y", LightState.RED: "r"}
@@ -55,20 +55,20 @@ def speed_caps(cars: Sequence[VehicleState], people: Sequence[PedestrianState]) 
     walkers = positions(person for person in people if person.on_road)
     if not len(walkers):
         return {}
-    boxes = np.array([(c.pose.x, c.pose.y, c.pose.heading, c.length, c.speed) for c in cars]).reshape(-1, 5)
+    boxes = boxes_of(cars)
     allowed = np.empty(len(boxes))
     _allowed_speeds(boxes, walkers, allowed)
-    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < boxes[:, 4] + NOTICE).tolist()}
+    return {cars[i].id: float(allowed[i]) for i in np.flatnonzero(allowed < boxes[:, 3] + NOTICE).tolist()}
 
 
 @compiled
 def _allowed_speeds(boxes: Points, people: Points, allowed: NDArray[np.float64]) -> None:
-    """Writes how fast each car may drive (m/s); boxes: x, y, heading, length, speed; people: (N, 2) on the road."""
+    """Writes how fast each car may drive (m/s); boxes: see `geometry.boxes_of`; people: (N, 2) on the road."""
     for k in range(len(boxes)):
         c, s, gap = math.cos(boxes[k, 2]), math.sin(boxes[k, 2]), math.inf
         for person in range(len(people)):
             dx, dy = people[person, 0] - boxes[k, 0], people[person, 1] - boxes[k, 1]
-            ahead, left = dx * c + dy * s - boxes[k, 3] / 2, dy * c - dx * s
+            ahead, left = dx * c + dy * s - boxes[k, 4], dy * c - dx * s
             # Who stands beside the bonnet waits for the car to pass, so the car must not wait for them.
             half_width = HALF_CORRIDOR if ahead > BESIDE else HALF_BONNET
             if abs(left) < half_width and -BESIDE < ahead < PEOPLE_AHEAD:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from caldrive.compiled import compiled
 from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
+from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import LightPost, RoadNetwork
 
 SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
@@ -92,33 +93,33 @@ class _LoopDetectors:
         self.centers = np.array([stops.mean(0) for stops in groups])
         self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
 
-    def look(self, poses: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether somebody waits at each post (P,), and whether each junction is occupied (J,); poses: x, y, heading of
-        cars (N, 3)."""
+    def look(self, boxes: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether somebody waits at each post (P,), and whether each junction is occupied (J,); boxes: of cars, see
+        `geometry.boxes_of`."""
         waiting, occupied = np.zeros(len(self.headings), np.bool_), np.zeros(len(self.radii), np.bool_)
-        _look(poses, self.stops, self.headings, waiting)
-        _look_inside(poses, self.centers, self.radii, occupied)
+        _look(boxes, self.stops, self.headings, waiting)
+        _look_inside(boxes, self.centers, self.radii, occupied)
         return waiting, occupied
 
 
 @compiled
-def _look(poses: Points, stops: Points, headings: Points, waiting: NDArray[np.bool_]) -> None:
+def _look(boxes: Points, stops: Points, headings: Points, waiting: NDArray[np.bool_]) -> None:
     """Writes whether somebody (N, 3) waits at each post (P,), by the middles of the stop lines (P, 2)."""
     for post in range(len(stops)):
         c, s = math.cos(headings[post]), math.sin(headings[post])
-        for k in range(len(poses)):
-            dx, dy = poses[k, 0] - stops[post, 0], poses[k, 1] - stops[post, 1]
+        for k in range(len(boxes)):
+            dx, dy = boxes[k, 0] - stops[post, 0], boxes[k, 1] - stops[post, 1]
             ahead, left = dx * c + dy * s, dy * c - dx * s
             if -LOOP - HALF_CAR < ahead < JUST_BEYOND and abs(left) < LOOP_HALF_WIDTH:
-                waiting[post] |= math.cos(poses[k, 2] - headings[post]) > SAME_WAY
+                waiting[post] |= math.cos(boxes[k, 2] - headings[post]) > SAME_WAY
 
 
 @compiled
-def _look_inside(poses: Points, centers: Points, radii: Points, occupied: NDArray[np.bool_]) -> None:
+def _look_inside(boxes: Points, centers: Points, radii: Points, occupied: NDArray[np.bool_]) -> None:
     """Writes whether somebody is inside each junction (J,)."""
     for junction in range(len(centers)):
-        for k in range(len(poses)):
-            away = math.hypot(poses[k, 0] - centers[junction, 0], poses[k, 1] - centers[junction, 1])
+        for k in range(len(boxes)):
+            away = math.hypot(boxes[k, 0] - centers[junction, 0], boxes[k, 1] - centers[junction, 1])
             occupied[junction] |= away < radii[junction] - INSIDE
 
 
@@ -138,7 +139,7 @@ class TrafficLights:
         """Moves all junctions on to a time (s), given everybody who drives."""
         if self._detectors is None:
             return
-        waiting, occupied = self._detectors.look(np.array([(c.pose.x, c.pose.y, c.pose.heading) for c in cars]))
+        waiting, occupied = self._detectors.look(boxes_of(cars))
         first, waits = 0, waiting.tolist()
         for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
             last = first + len(junction.posts)
