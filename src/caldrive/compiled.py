@@ -66,7 +66,9 @@ def code_folder() -> Path | None:
 def _state_of_sources() -> str:
     """Tells the sources that anything compiled may be made of from any others."""
     root = Path(__file__).parent
-    sources = sorted([root / "compiled.py", root / "datatypes.py", *(root / "world").rglob("*.py")])
+    packages = ("world", "perception/inference")
+    sources = [path for package in packages for path in sorted((root / package).rglob("*.py"))]
+    sources += [root / "compiled.py", root / "datatypes.py"]
     return hashlib.sha256(b"".join(hashlib.sha256(path.read_bytes()).digest() for path in sources)).hexdigest()[:16]
 
 

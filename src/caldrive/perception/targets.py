@@ -51,8 +51,9 @@ def scaled_error(spec: AffordanceSpec, output: Tensor, target: Tensor) -> Tensor
     return (output[:, 0] - target).abs().masked_fill(beyond, 0.0)
 
 
-def decode(outputs: Outputs) -> Affordances:
-    """Outputs with N = 1 as affordances: probabilities by softmax, the likeliest sign, values in SI units."""
+def decode(outputs: Mapping[str, Tensor | NDArray[np.float32]]) -> Affordances:
+    """Outputs with N = 1, of torch or numpy, as affordances: probabilities by softmax, the likeliest sign, values in SI
+    units."""
     values: dict[str, Any] = {}
     for spec in SPECS:
         output: list[float] = outputs[spec.name][0].tolist()

@@ -60,7 +60,7 @@ def test_the_check_learns_to_tell_noise_from_a_picture(frames: Frames) -> None:
     images = frames.images(np.arange(20))
     noise = np.random.default_rng(0).integers(0, 256, images.shape, dtype=np.uint8)
     with torch.no_grad():
-        fine, noisy = (evidence(check(normalise(to_float(some))))[:, 0].mean() for some in (images, noise))
+        fine, noisy = (evidence(check(normalise(to_float(some))).numpy())[:, 0].mean() for some in (images, noise))
     assert noisy - fine > 0.5
     thresholds = evidence_thresholds(check, frames)
     assert len(thresholds) == len(REASONS)
@@ -115,7 +115,7 @@ def test_a_check_that_cannot_be_is_named(tmp_path: Path, what: str) -> None:
 
 
 def test_the_evidence_is_within_what_one_image_may_count() -> None:
-    outputs = torch.tensor([[0.0, 1.0, 70.0, *[-50.0] * (len(REASONS) - 2)]])
+    outputs = np.array([[0.0, 1.0, 70.0, *[-50.0] * (len(REASONS) - 2)]], np.float32)
     assert evidence(outputs)[0].tolist() == [1.0, MOST_EVIDENCE, *[-MOST_EVIDENCE] * (len(REASONS) - 2)]
 
 

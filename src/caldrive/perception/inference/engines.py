@@ -9,6 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from caldrive.compiled import Floats
 from caldrive.datatypes import Image
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network.camera_check import CameraCheck
@@ -16,9 +17,9 @@ from caldrive.perception.network.network import Network
 
 BackboneEngine = Callable[[Tensor], Tensor]  # normalised images (N, 3, H, W) to features (N, F)
 # An image (H, W, 3) in bytes to features (1, F), and the camera check's outputs (1, 1 + reasons).
-EyesEngine = Callable[[Image], tuple[Tensor, Tensor | None]]
-# Features (1, span, F) and a command (1,) to outputs (1, K) by affordance.
-BlocksEngine = Callable[[Tensor, Tensor], Mapping[str, Tensor]]
+EyesEngine = Callable[[Image], tuple[Floats, Floats | None]]
+# Features (span, F) and a command's number to outputs (1, K) by affordance.
+BlocksEngine = Callable[[Floats, int], Mapping[str, Floats]]
 
 INTEGERS = {"int8": 8, "int7": 7}  # bits of a weight
 PRECISIONS = ("auto", "fp32", "bf16", *INTEGERS)
@@ -102,9 +103,10 @@ def eyes_engine(
         )
     backbone = backbone_engine(precision, network, ranges, threads)
 
-    def look(image: Image) -> tuple[Tensor, Tensor | None]:
+    @torch.inference_mode()
+    def look(image: Image) -> tuple[Floats, Floats | None]:
         images = normalise(to_float(image[None]))
-        return backbone(images), None if check is None else check(images)
+        return backbone(images).numpy(), None if check is None else check(images).numpy()
 
     return look
 
@@ -117,4 +119,10 @@ def blocks_engine(precision: str, network: Network, threads: int | None = None) 
 
         if all(block.config.layer in LAYERS for block in network.task_blocks().values()):
             return OpenVINOBlocks(network, threads or torch.get_num_threads())
-    return network
+
+    @torch.inference_mode()
+    def decide(history: Floats, command: int) -> Mapping[str, Floats]:
+        outputs = network(torch.from_numpy(history)[None], torch.tensor([command]))
+        return {name: output.numpy() for name, output in outputs.items()}
+
+    return decide

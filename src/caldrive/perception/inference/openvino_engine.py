@@ -17,6 +17,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from caldrive.compiled import Floats
 from caldrive.datatypes import Image
 from caldrive.perception.images import gain_and_shift
 from caldrive.perception.network.backbone import Backbone
@@ -32,13 +33,28 @@ from openvino import opset13  # noqa: E402
 ops: Any = opset13
 
 
-def compiled(outputs: list[Any], parameter: Any, threads: int) -> ov.InferRequest:
-    """A request that computes the outputs, each frame as soon as it comes."""
-    settings = {
-        "INFERENCE_NUM_THREADS": threads, "INFERENCE_PRECISION_HINT": "f32", "PERFORMANCE_HINT": "LATENCY",
-        "ENABLE_CPU_PINNING": False,
-    }  # fmt: skip
-    return ov.Core().compile_model(ov.Model(outputs, [parameter]), "CPU", settings).create_infer_request()
+class Graph:
+    """Compiled outputs of one parameter, for one input after the other.
+
+    Inputs are copied to where OpenVINO reads them and outputs from where it writes them: its own ways in and out take
+    another millisecond of a step.
+    """
+
+    def __init__(self, outputs: list[Any], parameter: Any, threads: int) -> None:
+        settings = {
+            "INFERENCE_NUM_THREADS": threads, "INFERENCE_PRECISION_HINT": "f32", "PERFORMANCE_HINT": "LATENCY",
+            "ENABLE_CPU_PINNING": False,
+        }  # fmt: skip
+        model = ov.Model(outputs, [parameter])
+        self._request = ov.Core().compile_model(model, "CPU", settings).create_infer_request()
+        self._input = self._request.get_input_tensor(0).data
+        self._outputs = [self._request.get_output_tensor(k).data for k in range(len(outputs))]
+
+    def __call__(self, values: NDArray[Any]) -> list[Floats]:
+        """The outputs for values of the parameter's shape and type."""
+        self._input[...] = values
+        self._request.infer(share_outputs=True)
+        return [output.copy() for output in self._outputs]
 
 
 def constant(values: Tensor, *shape: int) -> Any:
@@ -109,12 +125,11 @@ class Int8Backbone:
     ) -> None:
         _require_trained(backbone, ranges)
         image = ops.parameter([1, 3, *size], np.float32)
-        self._request = compiled([_backbone_graph(image, backbone, ranges, bits)], image, threads)
+        self._graph = Graph([_backbone_graph(image, backbone, ranges, bits)], image, threads)
 
     def __call__(self, images: Tensor) -> Tensor:
         """Normalised images (N, 3, H, W), which pass one at a time, to features (N, F)."""
-        features = [self._request.infer([image], share_inputs=True)[0] for image in images.numpy()[:, None]]
-        return torch.from_numpy(np.concatenate(features))
+        return torch.from_numpy(np.concatenate([self._graph(image)[0] for image in images.numpy()[:, None]]))
 
 
 def _require_trained(backbone: Backbone, ranges: Sequence[float]) -> None:
@@ -153,12 +168,11 @@ class OpenVINOEyes:
         outputs = [_backbone_graph(x, network.backbone, ranges, bits)]
         if check is not None:
             outputs.append(_check_graph(x, check))
-        self._request = compiled(outputs, image, threads)
+        self._graph = Graph(outputs, image, threads)
 
-    def __call__(self, image: Image) -> tuple[Tensor, Tensor | None]:
+    def __call__(self, image: Image) -> tuple[Floats, Floats | None]:
         """An image (H, W, 3) to features (1, F) and the check's outputs (1, 1 + reasons), None without one."""
-        outputs = self._request.infer([np.ascontiguousarray(image[None])], share_inputs=True)
-        features, *checked = (torch.from_numpy(outputs[k]) for k in range(len(outputs)))
+        features, *checked = self._graph(image[None])
         return features, checked[0] if checked else None
 
 
@@ -200,17 +214,16 @@ class OpenVINOBlocks:
             layers = ", ".join(sorted(unknown))
             raise ValueError(f"found task blocks of {layers}, wanted {' or '.join(LAYERS)}: type --precision fp32")
         self._names = list(blocks)
-        self._requests = [self._compiled(network, command, threads) for command in range(len(COMMANDS))]
+        self._graphs = [self._graph(network, command, threads) for command in range(len(COMMANDS))]
 
     @staticmethod
-    def _compiled(network: Network, command: int, threads: int) -> Any:
+    def _graph(network: Network, command: int, threads: int) -> Graph:
         n_features = network.backbone.n_features(*network.config.image_size)
         sequence = ops.parameter([network.span, n_features], np.float32)
         blocks = network.task_blocks().values()
         outputs = [_block_graph(sequence, block, block.group(command), network.span) for block in blocks]
-        return compiled(outputs, sequence, threads)
+        return Graph(outputs, sequence, threads)
 
-    def __call__(self, history: Tensor, command: Tensor) -> dict[str, Tensor]:
-        """Features (1, span, F) and a command (1,) to outputs (1, K), as the network does."""
-        outputs = self._requests[int(command[0])].infer([history[0].contiguous().numpy()], share_inputs=True)
-        return {name: torch.from_numpy(outputs[k].copy()) for k, name in enumerate(self._names)}
+    def __call__(self, history: Floats, command: int) -> dict[str, Floats]:
+        """Features (span, F) and a command's number to outputs (1, K), as the network does."""
+        return dict(zip(self._names, self._graphs[command](history), strict=True))

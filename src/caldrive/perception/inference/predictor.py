@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import torch
-from torch import Tensor
 
+from caldrive.compiled import Floats
 from caldrive.datatypes import Affordances, Observation
 from caldrive.interfaces import BadImage
 from caldrive.perception.images import check_image
@@ -49,7 +50,7 @@ class NetworkPerception:
             torch.set_num_threads(1 if precision in INTEGERS else threads)
         self._eyes = eyes_engine(precision, network, info.ranges, check, threads)
         self._blocks = blocks_engine(precision, network, threads)
-        self._history: Tensor | None = None  # (1, span, F)
+        self._history: Floats | None = None  # (span, F)
 
     def reset(self) -> None:
         """An episode begins: forget the last one's frames."""
@@ -57,19 +58,16 @@ class NetworkPerception:
         if self._watchdog is not None:
             self._watchdog.reset()
 
-    @torch.inference_mode()
     def predict(self, observation: Observation) -> Affordances:
         """The affordances of the newest frame. Raises BadImage where the image is no use."""
         check_image(observation.image, self.network.config.image_size)
-        features, checked = self._eyes(observation.image)
+        features, checked = self._eyes(observation.image)  # (1, F)
         if self._watchdog is not None:
             self._watchdog.look(observation, checked)
-        features = features[:, None]  # (1, 1, F)
-        if not bool(features.isfinite().all()):
+        if not np.isfinite(features).all():
             raise BadImage("the image's features are not numbers: brake, and look at the weights")
         if self._history is None:
-            self._history = features.expand(-1, self.network.span, -1)
+            self._history = features.repeat(self.network.span, axis=0)
         else:
-            self._history = torch.cat((self._history[:, 1:], features), dim=1)
-        command = torch.tensor([COMMANDS.index(observation.command)])
-        return decode(self._blocks(self._history, command))
+            self._history = np.concatenate((self._history[1:], features))
+        return decode(self._blocks(self._history, COMMANDS.index(observation.command)))

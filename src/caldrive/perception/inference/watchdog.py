@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from torch import Tensor
 
+from caldrive.compiled import Floats, compiled, f32, i32
 from caldrive.datatypes import Image, Observation
 from caldrive.interfaces import BadImage
 from caldrive.perception.network.camera_check import REASONS, WINDOWS, averaged, evidence
@@ -61,9 +59,11 @@ class Watchdog:
         self._evidence = np.zeros((max(WINDOWS), len(REASONS)), np.float32)  # of the last frames
         self._unlike = ""  # what is wrong, while the images are unlike the recording's
 
-    def look(self, observation: Observation, outputs: Tensor | None = None) -> None:
+    def look(self, observation: Observation, outputs: Floats | None = None) -> None:
         """Raises BadImage, with what is wrong, where the camera has failed. outputs: of the camera check (1, 1 +
         reasons), None without one."""
+        # A copy: a camera may fill the same memory again, and compiled code is made for one layout only.
+        observation = replace(observation, image=np.array(observation.image, order="C"))
         faults = (  # each sees every frame, whatever the others say
             _old(observation, self.config.oldest),
             _plain(observation.image, self.config.least_spread),
@@ -73,9 +73,9 @@ class Watchdog:
         if fault := next(filter(None, faults), ""):
             raise BadImage(f"{fault}: brake, and look at the camera")
 
-    def _unlike_recording(self, outputs: Tensor) -> str:
+    def _unlike_recording(self, outputs: Floats) -> str:
         """What is wrong with the images of the last seconds, or nothing."""
-        self._evidence = np.concatenate((self._evidence[1:], evidence(outputs).numpy()))
+        self._evidence = np.concatenate((self._evidence[1:], evidence(outputs)))
         above = averaged(self._evidence) - self._thresholds
         if above.max() > 0:
             self._unlike = f"the image is {tuple(REASONS)[above.argmax()]}"
@@ -89,69 +89,93 @@ class Stillness:
 
     def __init__(self, config: WatchdogConfig) -> None:
         self.config = config
-        self._time: float | None = None
-        self._pixels: NDArray[np.float32] = np.zeros(0, np.float32)
-        self._means: NDArray[np.float32] = self._pixels
-        self._frozen_for = self._same_for = np.zeros(0)
+        self._time = math.nan
+        self._image = np.zeros((0, 0, 3), np.uint8)
 
     def fault(self, observation: Observation) -> str:
         """What is wrong after one more frame, or nothing."""
-        pixels = _below_horizon(observation.image)
-        means = _cell_sums(pixels, _columns(pixels.shape[1], colors=3)) / np.float32(CELL**2)
-        means = means.reshape(len(means), -1, 3)
-        if self._time is None or pixels.shape != self._pixels.shape:
-            self._means = means
-            self._frozen_for = self._same_for = np.zeros(means.shape[:2])
-        else:
-            self._advance(pixels, means, _moved(observation, self._time))
-        self._time, self._pixels = observation.time, pixels
-        frozen = np.count_nonzero(self._frozen_for > self.config.frozen_metres)
-        if frozen >= self.config.frozen_share * self._frozen_for.size:
-            return f"the image has not changed for {self._frozen_for.min():.1f} m"
-        if np.count_nonzero(self._same_for > self.config.covered_metres) >= self.config.covered_cells:
-            return f"a part of the image has not changed for {self._same_for.max():.0f} m"
+        image, metres, config = observation.image, _moved(observation, self._time), self.config
+        if image.shape != self._image.shape:
+            self._begin(image)
+        _move_on(image, self._image, self._sums, self._changed, metres, (config.change, config.still))
+        self._time, self._image = observation.time, image
+        frozen_for, same_for = self._changed
+        if np.count_nonzero(frozen_for > config.frozen_metres) >= config.frozen_share * frozen_for.size:
+            return f"the image has not changed for {frozen_for.min():.1f} m"
+        if np.count_nonzero(same_for > config.covered_metres) >= config.covered_cells:
+            return f"a part of the image has not changed for {same_for.max():.0f} m"
         return ""
 
-    def _advance(self, pixels: NDArray[np.float32], means: NDArray[np.float32], metres: float) -> None:
-        other = np.abs(means - self._means).max(-1) > self.config.change
-        self._means = np.where(other[..., None], means, self._means)  # slow changes add up
-        self._frozen_for = np.where(other, 0.0, self._frozen_for + metres)
-        differences = _cell_sums(np.abs(pixels - self._pixels), _columns(pixels.shape[1], colors=1))
-        self._same_for = np.where(differences > self.config.still * 3 * CELL**2, 0.0, self._same_for + metres)
+    def _begin(self, image: Image) -> None:
+        """The first image: all cells are new."""
+        height, width = image.shape[:2]
+        cells = height // CELL - first_row(height), width // CELL
+        self._image = image
+        self._sums = np.full((*cells, 3), math.inf, np.float32)
+        self._changed = np.zeros((2, *cells), np.float32)
 
 
-def _below_horizon(image: Image) -> NDArray[np.float32]:
-    """The lower part of an image, as far as whole cells cover it, in rows of bytes (rows, 3 W); a level camera has the
-    horizon in the middle."""
-    height, width = (side // CELL * CELL for side in image.shape[:2])
-    top = math.ceil((image.shape[0] / 2 + CELL / 2) / CELL) * CELL
-    return image[top:height, :width].reshape(height - top, -1).astype(np.float32)
+def first_row(height: int) -> int:
+    """The first row of cells below the horizon; a level camera has it in the middle."""
+    return math.ceil((height / 2 + CELL / 2) / CELL)
 
 
-@lru_cache(maxsize=8)
-def _columns(width: int, colors: int) -> NDArray[np.float32]:
-    """Ones (width, cells * colors) where a byte of a row belongs to a cell, and with three colours to one of them: a
-    product with it adds them up, ten times as fast as a sum over axes."""
-    byte = np.arange(width)
-    cell = byte // (3 * CELL) * colors + byte % 3 % colors
-    return np.asarray(cell[:, None] == np.arange(width // (3 * CELL) * colors), dtype=np.float32)
-
-
-def _cell_sums(rows: NDArray[np.float32], columns: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Sums over cells (cell rows, columns of `_columns`)."""
-    return np.asarray(rows.reshape(-1, CELL, rows.shape[1]).sum(axis=1) @ columns, dtype=np.float32)
+@compiled
+def _move_on(
+    image: Image, before: Image, sums: Floats, changed: Floats, metres: float, limits: tuple[float, float]
+) -> None:
+    """The distances `changed` (2, rows, columns) since each cell's mean changed and since any of its pixels did, one
+    frame and so many metres later. sums (rows, columns, 3): of a cell's bytes when its mean last changed, as slow
+    changes add up; limits: change and still of `WatchdogConfig`."""
+    change, still = f32(limits[0] * CELL**2), f32(limits[1] * 3 * CELL**2)
+    rows, columns = sums.shape[:2]
+    top = image.shape[0] // CELL - rows
+    for row in range(rows):
+        for column in range(columns):
+            red, green, blue, difference = i32(0), i32(0), i32(0), i32(0)
+            for y in range(CELL * (top + row), CELL * (top + row + 1)):
+                for x in range(CELL * column, CELL * (column + 1)):
+                    red += i32(image[y, x, 0])
+                    green += i32(image[y, x, 1])
+                    blue += i32(image[y, x, 2])
+                    for color in range(3):
+                        difference += abs(i32(image[y, x, color]) - i32(before[y, x, color]))
+            cell, moved = sums[row, column], f32(metres)
+            farthest = max(abs(f32(red) - cell[0]), abs(f32(green) - cell[1]), abs(f32(blue) - cell[2]))
+            changed[0, row, column] += moved
+            changed[1, row, column] += moved
+            if farthest > change:
+                cell[0], cell[1], cell[2] = f32(red), f32(green), f32(blue)
+                changed[0, row, column] = f32(0)
+            if f32(difference) > still:
+                changed[1, row, column] = f32(0)
 
 
 def _moved(observation: Observation, before: float) -> float:
-    """Metres since a time; none where speed or time make no sense."""
+    """Metres since a time; none where speed or time make no sense, as before the first frame."""
     metres = observation.speed * (observation.time - before)
     return metres if math.isfinite(metres) and metres > 0 else 0.0
 
 
 def _plain(image: Image, least: float) -> str:
-    pixels = image[::4, ::4].reshape(-1, 3).astype(np.float32)
-    spread = float(np.sqrt(((pixels - pixels.mean(axis=0)) ** 2).mean(axis=0)).mean())
+    spread = _spread(image)
     return f"the image is one plain colour (deviation {spread:.1f})" if spread < least else ""
+
+
+@compiled
+def _spread(image: Image) -> float:
+    """The standard deviation of a colour's bytes, of every fourth pixel each way; the mean of the three."""
+    spread = 0.0
+    for color in range(3):
+        n = total = squares = 0
+        for y in range(0, image.shape[0], 4):
+            for x in range(0, image.shape[1], 4):
+                byte = int(image[y, x, color])
+                n += 1
+                total += byte
+                squares += byte * byte
+        spread += math.sqrt(squares / n - (total / n) ** 2) / 3
+    return spread
 
 
 def _old(observation: Observation, oldest: float) -> str:

@@ -76,10 +76,10 @@ class CameraCheck(nn.Module):
         return outputs
 
 
-def evidence(outputs: Tensor) -> Tensor:
+def evidence(outputs: NDArray[np.float32]) -> NDArray[np.float32]:
     """For each reason the logarithm of the odds (N, reasons) that it is wrong with the image, and not nothing, from
     outputs (N, 1 + reasons)."""
-    return (outputs[:, 1:] - outputs[:, :1]).clamp(-MOST_EVIDENCE, MOST_EVIDENCE)
+    return (outputs[:, 1:] - outputs[:, :1]).clip(-MOST_EVIDENCE, MOST_EVIDENCE)
 
 
 def averaged(odds: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

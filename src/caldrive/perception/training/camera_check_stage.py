@@ -101,7 +101,7 @@ def evidence_thresholds(check: CameraCheck, frames: Frames) -> list[float]:
             group = np.zeros(len(images), np.int64)
             shown = _in_other_light(images, group, seed=int(first) * LOOKS + look) if look else images
             parts = torch.split(normalise(to_float(shown)), FRAMES_A_PASS)
-            odds = torch.cat([evidence(check(part)) for part in parts]).numpy()
+            odds = np.concatenate([evidence(check(part).numpy()) for part in parts])
             means = [averaged(odds[max(0, k - max(WINDOWS)) : k]) for k in range(1, len(odds) + 1)]
             largest = np.maximum(largest, np.max(means, axis=0))
     return [max(LEAST, MARGIN + float(value)) for value in largest]
