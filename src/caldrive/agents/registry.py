@@ -75,7 +75,7 @@ def _cal_camera(settings: AgentSettings) -> CameraConfig:
 
 
 def _cal_provenance(settings: AgentSettings) -> dict[str, Any]:
-    from caldrive.perception.inference.engines import driving_precision
+    from caldrive.perception.inference.precision import driving_precision
     from caldrive.perception.network.checkpoint import read_info
 
     path = model_path(settings.model)

@@ -76,7 +76,8 @@ class Evaluate(Output):
         from caldrive.commands.tables import evaluation_table
         from caldrive.perception.dataset.frames import Frames
         from caldrive.perception.evaluation.report import published_metrics, report
-        from caldrive.perception.inference.engines import backbone_engine, driving_precision
+        from caldrive.perception.inference.engines import backbone_engine
+        from caldrive.perception.inference.precision import driving_precision
         from caldrive.perception.network.checkpoint import load_network
         from caldrive.recordings.folder import find_episodes, held_out
 

@@ -1,4 +1,4 @@
-"""The precision in which a network computes, and what runs its backbone and its task blocks in each."""
+"""What runs a network's backbone and its task blocks in each precision."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from torch import Tensor
 from caldrive.compiled import Floats
 from caldrive.datatypes import Image
 from caldrive.perception.images import normalise, to_float
+from caldrive.perception.inference.compiled_blocks import LAYERS, CompiledBlocks
 from caldrive.perception.network.camera_check import CameraCheck
 from caldrive.perception.network.network import Network
 
@@ -33,15 +34,6 @@ def _bf16_is_faster() -> bool:
     return bool(features.get("amx_bf16") or (features.get("avx512_bf16") and amd))
 
 
-def _fast_integers() -> str | None:
-    """int8 where the processor adds products of bytes in 32 bits (VNNI), int7 where it adds pairs of them in 16, which
-    weights of 8 bits would overflow; None where integers are no faster."""
-    features = torch.cpu.get_capabilities()
-    if any(features.get(name) for name in ("avx512_vnni", "avx_vnni", "amx_int8")):
-        return "int8"
-    return "int7" if features.get("avx2") else None
-
-
 def use_bf16(precision: str, device: str) -> bool:
     """Whether to compute in bfloat16; `auto` does where that is faster than fp32."""
     if precision not in ("auto", "fp32", "bf16"):
@@ -54,24 +46,6 @@ def use_bf16(precision: str, device: str) -> bool:
 def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
     """The context in which the network computes."""
     return torch.autocast(device.split(":")[0], torch.bfloat16) if use_bf16(precision, device) else nullcontext()
-
-
-def driving_precision(wanted: str, ranges: Sequence[float]) -> str:
-    """fp32, bf16, int8 or int7. `auto` is int8 or int7 where the network's ranges are known (not empty) and the
-    processor is fast with integers, else what is faster of the others.
-
-    Raises ValueError for another word, and for integers without ranges.
-    """
-    if wanted not in PRECISIONS:
-        raise ValueError(f"found precision {wanted!r}, wanted one of {', '.join(PRECISIONS)}: type --precision auto")
-    if wanted in INTEGERS:
-        if not ranges:
-            raise ValueError(
-                "found a network without the ranges that int8 needs: train it again, or type --precision fp32"
-            )
-        return wanted
-    integers = _fast_integers() if wanted == "auto" and ranges else None
-    return integers or ("bf16" if use_bf16(wanted, "cpu") else "fp32")
 
 
 def backbone_engine(
@@ -111,14 +85,10 @@ def eyes_engine(
     return look
 
 
-def blocks_engine(precision: str, network: Network, threads: int | None = None) -> BlocksEngine:
-    """The task blocks when driving: beside a backbone in integers they, too, pass OpenVINO, where it has their layers;
-    two libraries would wait for each other's threads."""
-    if precision in INTEGERS:
-        from caldrive.perception.inference.openvino_engine import LAYERS, OpenVINOBlocks
-
-        if all(block.config.layer in LAYERS for block in network.task_blocks().values()):
-            return OpenVINOBlocks(network, threads or torch.get_num_threads())
+def blocks_engine(precision: str, network: Network) -> BlocksEngine:
+    """The task blocks when driving: beside a backbone in integers as one compiled loop, where it has their layers."""
+    if precision in INTEGERS and all(block.config.layer in LAYERS for block in network.task_blocks().values()):
+        return CompiledBlocks(network)
 
     @torch.inference_mode()
     def decide(history: Floats, command: int) -> Mapping[str, Floats]:

@@ -1,9 +1,8 @@
-"""A finished network driving through OpenVINO: the backbone in 8-bit integers, the task blocks in 32 bits.
+"""A finished network driving through OpenVINO: the backbone in 8-bit integers, the camera check in 32 bits.
 
 On a CPU with VNNI the backbone is four times as fast as torch in 32 bits, on older ones twice. Post-training
 quantization (Jacob et al. 2018): weights have a scale for each channel that they give; what enters a convolution has
-one scale, found on recorded images (`calibration.input_ranges`). The task blocks give the same values as torch's, in a
-third of the time.
+one scale, found on recorded images (`calibration.input_ranges`).
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from caldrive.datatypes import Image
 from caldrive.perception.images import gain_and_shift
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.camera_check import CameraCheck
-from caldrive.perception.network.network import COMMANDS, Network, NodeGroup, TaskBlock
+from caldrive.perception.network.network import Network
 
 # OpenVINO's converter, which nobody needs here, tells its makers over the network when it is imported. None in its
 # place keeps it out, and the rest works without it.
@@ -64,12 +63,8 @@ def constant(values: Tensor, *shape: int) -> Any:
 
 
 def normalised(x: Any, norm: nn.Module, *shape: int) -> Any:
-    """Batch norm by its running statistics, or layer norm over the last axis, with gain and shift of this shape;
-    anything else leaves x as it is."""
-    if isinstance(norm, nn.LayerNorm):
-        x = ops.mvn(x, ops.constant(np.array([-1])), True, norm.eps, "inside_sqrt")
-        return ops.add(ops.multiply(x, constant(norm.weight, *shape)), constant(norm.bias, *shape))
-    if not isinstance(norm, nn.BatchNorm1d | nn.BatchNorm2d):
+    """Batch norm by its running statistics, with gain and shift of this shape; anything else leaves x as it is."""
+    if not isinstance(norm, nn.BatchNorm2d):
         return x
     assert norm.running_var is not None
     assert norm.running_mean is not None
@@ -153,6 +148,11 @@ def _check_graph(x: Any, check: CameraCheck) -> Any:
     return _linear(ops.relu(_linear(x, check.head[0])), check.head[-1])
 
 
+def _linear(x: Any, layer: nn.Module) -> Any:
+    assert isinstance(layer, nn.Linear)
+    return ops.add(ops.matmul(x, constant(layer.weight), False, True), constant(layer.bias, 1, -1))
+
+
 class OpenVINOEyes:
     """What looks at every image when driving: a trained backbone in integers, and the camera check. bits: of a weight,
     see `Int8Backbone`. Raises ValueError as that does."""
@@ -174,56 +174,3 @@ class OpenVINOEyes:
         """An image (H, W, 3) to features (1, F) and the check's outputs (1, 1 + reasons), None without one."""
         features, *checked = self._graph(image[None])
         return features, checked[0] if checked else None
-
-
-LAYERS = ("dense", "tconv")  # those that have a graph here
-
-
-def _linear(x: Any, layer: nn.Module) -> Any:
-    assert isinstance(layer, nn.Linear)
-    return ops.add(ops.matmul(x, constant(layer.weight), False, True), constant(layer.bias, 1, -1))
-
-
-def _gathered(sequence: Any, rows: list[int]) -> Any:
-    """These rows of a sequence (T, F)."""
-    return ops.gather(sequence, ops.constant(np.array(rows)), ops.constant(0))
-
-
-def _block_graph(sequence: Any, block: TaskBlock, group: NodeGroup, span: int) -> Any:
-    """A group of nodes of a block, from the last `span` frames' features (span, F) to its outputs (1, K)."""
-    config, steps = block.config, group.steps
-    frames = [span - 1 - config.dilation * back for back in range(config.length - 1, -1, -1)]
-    windows = [_gathered(sequence, frames[k : len(frames) - steps + 1 + k]) for k in range(steps)]  # under the kernel
-    if group.kind == "tconv":  # each feature's values lie side by side
-        windows = [ops.transpose(window, ops.constant([1, 0])) for window in windows]
-    flat_windows = ops.concat([ops.reshape(window, ops.constant([1, -1]), False) for window in windows], 0)
-    hidden = ops.relu(normalised(_linear(flat_windows, group.layer), group.norm, 1, -1))  # (steps, nodes)
-    flat = ops.reshape(ops.transpose(hidden, ops.constant([1, 0])), ops.constant([1, -1]), False)
-    return _linear(flat, group.output)
-
-
-class OpenVINOBlocks:
-    """The task blocks of a trained network when driving; for each command a graph with the groups that are active then.
-
-    threads: how many it may use. Raises ValueError for a block that has no graph here, see `LAYERS`.
-    """
-
-    def __init__(self, network: Network, threads: int) -> None:
-        blocks = network.task_blocks()
-        if unknown := {block.config.layer for block in blocks.values()} - set(LAYERS):
-            layers = ", ".join(sorted(unknown))
-            raise ValueError(f"found task blocks of {layers}, wanted {' or '.join(LAYERS)}: type --precision fp32")
-        self._names = list(blocks)
-        self._graphs = [self._graph(network, command, threads) for command in range(len(COMMANDS))]
-
-    @staticmethod
-    def _graph(network: Network, command: int, threads: int) -> Graph:
-        n_features = network.backbone.n_features(*network.config.image_size)
-        sequence = ops.parameter([network.span, n_features], np.float32)
-        blocks = network.task_blocks().values()
-        outputs = [_block_graph(sequence, block, block.group(command), network.span) for block in blocks]
-        return Graph(outputs, sequence, threads)
-
-    def __call__(self, history: Floats, command: int) -> dict[str, Floats]:
-        """Features (span, F) and a command's number to outputs (1, K), as the network does."""
-        return dict(zip(self._names, self._graphs[command](history), strict=True))

@@ -11,7 +11,8 @@ from caldrive.compiled import Floats
 from caldrive.datatypes import Affordances, Observation
 from caldrive.interfaces import BadImage
 from caldrive.perception.images import check_image
-from caldrive.perception.inference.engines import INTEGERS, blocks_engine, driving_precision, eyes_engine
+from caldrive.perception.inference.engines import INTEGERS, blocks_engine, eyes_engine
+from caldrive.perception.inference.precision import driving_precision
 from caldrive.perception.inference.watchdog import Watchdog
 from caldrive.perception.network.camera_check import CameraCheck, load_camera_check
 from caldrive.perception.network.checkpoint import CheckpointInfo, load_network
@@ -49,7 +50,7 @@ class NetworkPerception:
         if threads is not None:  # torch's own would wait for one another beside those of a backbone in integers
             torch.set_num_threads(1 if precision in INTEGERS else threads)
         self._eyes = eyes_engine(precision, network, info.ranges, check, threads)
-        self._blocks = blocks_engine(precision, network, threads)
+        self._blocks = blocks_engine(precision, network)
         self._history: Floats | None = None  # (span, F)
 
     def reset(self) -> None:

@@ -20,7 +20,8 @@ from torch.optim import Adam
 
 from caldrive.perception.dataset.frames import Frames, Ids
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.inference.engines import BackboneEngine, backbone_engine, driving_precision
+from caldrive.perception.inference.engines import BackboneEngine, backbone_engine
+from caldrive.perception.inference.precision import driving_precision
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.checkpoint import (
     CheckpointError,
