@@ -15,7 +15,7 @@ from caldrive.benchmark.report.runs import load_runs
 from caldrive.files import write_whole
 
 RESULTS = Path(__file__).parents[1] / "docs" / "results"
-SUITES = ("corl2017", "nocrash", "traffic-school")
+SUITES = ("corl2017",)
 CAUSES, FAILURES = "## How missed goals began\n", "## Failures\n"
 CAUSE = FAILURE_HEAD.index("how it began")
 

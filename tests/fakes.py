@@ -78,6 +78,12 @@ class StraightRoad:
         axle = moved(self.ego.pose, forward=CAR.front_axle)
         return self.line.project(axle.x, axle.y).s
 
+    def _to_goal(self) -> float:
+        """Arc length of the goal, if it lies on the route."""
+        s = self.line.project(self.goal.x, self.goal.y).s
+        there = self.line.pose_at(s)
+        return s if math.hypot(there.x - self.goal.x, there.y - self.goal.y) < 1.0 else self.line.length
+
     def _observation(self) -> Observation:
         command = self.command if self.along >= self.turn_from else Command.STRAIGHT
         return Observation(self.time, IMAGE, self.ego.speed, command)
@@ -109,6 +115,6 @@ class StraightRoad:
             pedestrians=people,
             lights=self._light(),
             route_done=self.along,
-            route_length=self.line.length,
+            route_length=self._to_goal(),
             goal_distance=math.hypot(self.ego.pose.x - self.goal.x, self.ego.pose.y - self.goal.y),
         )

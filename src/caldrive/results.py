@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from enum import Enum
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, NotRequired, TypedDict
 
 from caldrive.datatypes import KMH
 from caldrive.files import as_type
@@ -27,7 +28,8 @@ WITHOUT_END = (Outcome.TIMEOUT, Outcome.ABORTED)  # neither the goal nor a broke
 
 
 class InfractionKind(Enum):
-    """The paper's six kinds of infraction (section 3)."""
+    """The paper's six kinds of infraction (section 3); NoCrash's lights that are not green; and speeding: "the speed
+    limit must be obeyed at all times"."""
 
     OPPOSITE_LANE = "opposite lane"
     SIDEWALK = "sidewalk"
@@ -35,6 +37,8 @@ class InfractionKind(Enum):
     COLLISION_OBJECT = "collision with object"
     COLLISION_CAR = "collision with car"
     COLLISION_PERSON = "collision with person"
+    YELLOW_LIGHT = "yellow light"
+    SPEEDING = "speeding"
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,9 @@ class Infraction:
 class EpisodeResult:
     """The whole episode: duration in s; distance driven, route_done and route_length in m; comfort: figures by name.
 
-    Raises ValueError for values that cannot be measured.
+    rules: by which infractions were counted, see `driving.rules`. touches: everything that was touched, once a contact,
+    however soft. speeding: share of the time in [0, 1] that was faster than the signs allow; worst_excess: by how much
+    at most, km/h. Raises ValueError for values that cannot be measured.
     """
 
     scenario: Scenario
@@ -63,6 +69,10 @@ class EpisodeResult:
     route_length: float
     infractions: tuple[Infraction, ...] = ()
     comfort: dict[str, float] = field(default_factory=dict)
+    rules: str = "corl2017"
+    touches: tuple[Infraction, ...] = ()
+    speeding: float = 0.0
+    worst_excess: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("duration", "distance"):
@@ -95,6 +105,10 @@ class _Result(TypedDict):
     route_length: float | None
     infractions: tuple[Infraction, ...]
     comfort: dict[str, float]
+    rules: NotRequired[str]
+    touches: NotRequired[tuple[Infraction, ...]]
+    speeding: NotRequired[float]
+    worst_excess: NotRequired[float]
 
 
 def result_from_values(values: Any) -> EpisodeResult:
@@ -109,18 +123,29 @@ def result_from_values(values: Any) -> EpisodeResult:
         route_length=math.inf if fields["route_length"] is None else fields["route_length"],
         infractions=fields["infractions"],
         comfort=fields["comfort"],
+        rules=fields.get("rules", "corl2017"),
+        touches=fields.get("touches", ()),
+        speeding=fields.get("speeding", 0.0),
+        worst_excess=fields.get("worst_excess", 0.0),
     )
 
 
 def result_values(result: EpisodeResult) -> dict[str, Any]:
     """An EpisodeResult in JSON's types; mean_speed in km/h."""
-    infractions = [asdict(infraction) | {"kind": infraction.kind.value} for infraction in result.infractions]
+    numbers = ("duration", "distance", "route_done", "route_length", "speeding", "worst_excess")
     return {
         "scenario": scenario_values(result.scenario),
         "outcome": result.outcome.name.lower(),
         "message": result.outcome.value,
-        "infractions": [{name: plain(value) for name, value in row.items()} for row in infractions],
+        "rules": result.rules,
+        "infractions": _infraction_values(result.infractions),
+        "touches": _infraction_values(result.touches),
         "comfort": {name: plain(value) for name, value in result.comfort.items()},
         "mean_speed": plain(mean_speed(result)),
-        **{name: plain(getattr(result, name)) for name in ("duration", "distance", "route_done", "route_length")},
+        **{name: plain(getattr(result, name)) for name in numbers},
     }
+
+
+def _infraction_values(infractions: Iterable[Infraction]) -> list[dict[str, Any]]:
+    rows = [asdict(infraction) | {"kind": infraction.kind.value} for infraction in infractions]
+    return [{name: plain(value) for name, value in row.items()} for row in rows]

@@ -16,6 +16,8 @@ from caldrive.benchmark.metrics import (
     mean_errors,
     red_light_counts,
     route_completion,
+    speeding,
+    touch_rates,
     wilson,
 )
 from caldrive.benchmark.suites import Trial, TrialResult
@@ -88,10 +90,38 @@ def test_kilometres_between_infractions_are_open_where_none_occurred() -> None:
     assert rates[InfractionKind.RED_LIGHT].km_between == "> 1.5"
 
 
-def test_what_others_cause_does_not_count() -> None:
+def test_what_others_cause_counts_as_in_carla_and_apart_from_own_faults() -> None:
     hit = Infraction(InfractionKind.COLLISION_CAR, 1.0, 0, 0, at_fault=False)
-    by_others = replace(driven(), episode=replace(driven().episode, infractions=(hit,)))
-    assert all(rate.count == 0 for rate in infraction_rates([by_others]))
+    both = replace(driven(), episode=replace(driven().episode, infractions=(hit, replace(hit, at_fault=True))))
+    counts = {rate.kind: (rate.count, rate.own) for rate in infraction_rates([both])}
+    assert counts.pop(InfractionKind.COLLISION_CAR) == (2, 1)
+    assert set(counts.values()) == {(0, 0)}
+
+
+def test_touches_are_rated_apart_from_infractions() -> None:
+    touch = Infraction(InfractionKind.COLLISION_PERSON, 1.0, 0, 0)
+    touched = replace(driven(), episode=replace(driven().episode, touches=(touch,) * 3))
+    assert {rate.kind: rate.count for rate in touch_rates([touched])} == {
+        InfractionKind.COLLISION_PERSON: 3, InfractionKind.COLLISION_CAR: 0, InfractionKind.COLLISION_OBJECT: 0,
+    }  # fmt: skip
+    assert all(rate.count == 0 for rate in infraction_rates([touched]))
+
+
+def test_a_cell_that_is_driven_several_times_has_a_deviation() -> None:
+    def of(repetition: int, *outcomes: Outcome) -> list[TrialResult]:
+        results = [driven(outcome) for outcome in outcomes]
+        return [replace(result, trial=replace(result.trial, repetition=repetition)) for result in results]
+
+    good, bad = Outcome.SUCCESS, Outcome.TIMEOUT
+    assert cells(of(0, good, bad))[0].deviation is None
+    (cell,) = cells(of(0, good, good) + of(1, good, bad) + of(2, bad, bad))
+    assert (cell.percent, cell.deviation) == (50, pytest.approx(50))
+
+
+def test_speeding_weighs_each_episode_by_its_time() -> None:
+    slow = replace(driven(), episode=replace(driven().episode, duration=30.0))
+    fast = replace(driven(), episode=replace(driven().episode, duration=10.0, speeding=0.4, worst_excess=7.0))
+    assert speeding([slow, fast]) == (pytest.approx(0.1), 7.0)
 
 
 def lasting(duration: float, metrics: dict[str, Any], **comfort: float) -> TrialResult:

@@ -93,6 +93,12 @@ def test_an_episode_that_would_end_elsewhere_is_driven_again(
     assert [record.line["key"] for record in records] == ([trial.key] if taken else [])
 
 
+def test_an_episode_that_was_counted_by_other_rules_is_driven_again(tmp_path: Path) -> None:
+    trial = suite("quick")[0]
+    folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())
+    assert list(reusable_records([RunFolder(folder)], [replace(trial, rules="nocrash")], BY)) == []
+
+
 def test_an_episode_without_its_trace_is_driven(tmp_path: Path) -> None:
     trial = suite("quick")[0]
     folder = known_folder(tmp_path, trial, Outcome.SUCCESS, ())

@@ -10,6 +10,8 @@ import pytest
 
 from caldrive.benchmark.suites import COLLISIONS, TRAFFIC_RULES, from_json, suite, to_json
 from caldrive.results import InfractionKind
+from caldrive.world.roads.route import plan_route
+from caldrive.world.roads.towns import load_roads
 
 
 def test_corl2017_has_25_routes_of_each_task_in_each_weather_of_each_condition() -> None:
@@ -27,15 +29,37 @@ def test_corl2017_has_25_routes_of_each_task_in_each_weather_of_each_condition()
 
 
 def test_no_episode_is_another_one_under_another_sky() -> None:
-    for name, count in (("corl2017", 1200), ("nocrash", 900)):
+    for name, count in (("corl2017", 1200), ("nocrash", 2700)):
         both = [replace(trial.scenario, weather=1, task="") for seed in (0, 1) for trial in suite(name, seed)]
         assert len(set(both)) == 2 * count
 
 
-def test_nocrash_shares_its_empty_and_regular_towns_with_the_papers_navigation() -> None:
-    known = {replace(trial.scenario, task="") for trial in suite("corl2017")}
-    shared = Counter(trial.scenario.task for trial in suite("nocrash") if replace(trial.scenario, task="") in known)
-    assert shared == {"empty": 300, "regular": 300}
+def test_nocrash_has_its_own_routes_weathers_and_time_limit() -> None:
+    trials = suite("nocrash")
+    new = {(trial.scenario.town, trial.scenario.weather) for trial in trials if "weather" in trial.condition}
+    assert new == {(town, weather) for town in ("town01", "town02") for weather in (10, 14)}
+    known = {(trial.scenario.town, trial.scenario.start, trial.scenario.goal) for trial in suite("corl2017")}
+    places = {(trial.scenario.town, trial.scenario.start, trial.scenario.goal) for trial in trials}
+    assert Counter(town for town, _, _ in places) == {"town01": 25, "town02": 25}
+    assert Counter(place[0] for place in places - known) == {"town01": 5}
+    scenario = trials[0].scenario
+    route = plan_route(load_roads(scenario.town), scenario.start, scenario.goal)
+    assert scenario.time_limit == pytest.approx(route.length / (5 / 3.6) + 20)
+    assert {trial.rules for trial in trials} == {"nocrash"}
+
+
+def test_nocrash_is_driven_three_times_in_other_traffic() -> None:
+    trials = suite("nocrash")
+    assert [trial.repetition for trial in trials[:900] + trials[-900:]] == [0] * 900 + [2] * 900
+    first, second = trials[0], trials[900]
+    assert (first.key, second.key) == ("town01-w01-empty-00-s0", "town01-w01-empty-00-s1")
+    assert first.scenario == replace(second.scenario, seed=first.scenario.seed)
+    assert first.scenario.seed != second.scenario.seed
+
+
+def test_nocrash_takes_no_other_time_limit() -> None:
+    with pytest.raises(ValueError, match=r"found --time-limit code, wanted none: NoCrash's .* leave it out"):
+        suite("nocrash", time_limit="code")
 
 
 def test_its_first_third_has_seen_every_cell() -> None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from caldrive.datatypes import Affordances, Contact, ContactKind, LightState, Pose, TrafficLight, Truth, VehicleState
-from caldrive.driving.referee import REST_FRAMES, Referee
+from caldrive.driving.referee import Referee
+from caldrive.driving.rules import CORL2017, NOCRASH, REST_FRAMES, STRICT, Rules
 from caldrive.results import InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 
@@ -32,8 +33,8 @@ def kinds(referee: Referee) -> list[InfractionKind]:
     return [infraction.kind for infraction in referee.infractions]
 
 
-def watched(frames: list[Truth]) -> Referee:
-    referee = Referee(SCENARIO)
+def watched(frames: list[Truth], rules: Rules = CORL2017, signs: bool = False) -> Referee:
+    referee = Referee(SCENARIO, rules=rules, signs=signs)
     for truth in frames:
         assert referee.watch(truth) is None
     return referee
@@ -75,6 +76,53 @@ def test_others_faults_hide_none_of_ones_own(
     theirs, own = ((Contact(contact, "it", threshold + 1, at_fault=fault),) for fault in (False, True))
     seen = watched([frame(0, contacts=theirs), frame(1, contacts=own), frame(2, contacts=theirs)])
     assert [infraction.at_fault for infraction in seen.infractions] == [False, True]
+
+
+@pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
+def test_soft_touches_add_up_to_a_collision_within_their_frames_only(
+    kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
+) -> None:
+    frames = 5 if contact is ContactKind.PERSON else 10
+    part = (Contact(contact, "it", threshold / frames, at_fault=True),)
+    more = (Contact(contact, "it", threshold / frames + 1, at_fault=True),)
+    assert kinds(watched([frame(i, contacts=part) for i in range(3 * frames)])) == []
+    assert kinds(watched([frame(i, contacts=more) for i in range(frames - 1)])) == []
+    assert kinds(watched([frame(i, contacts=more) for i in range(frames)])) == [kind]
+    apart = [frame(i, contacts=more if i % 2 else ()) for i in range(3 * frames)]
+    assert kinds(watched(apart)) == []
+
+
+@pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
+def test_a_collision_that_ends_nocrash_is_half_as_hard_and_of_one_frame(
+    kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
+) -> None:
+    def counted(impulse: float) -> list[InfractionKind]:
+        touch = (Contact(contact, "it", impulse, at_fault=True),)
+        return kinds(watched([frame(i, contacts=touch) for i in range(20)], NOCRASH))
+
+    assert counted(threshold / 2) == []
+    assert counted(threshold / 2 + 1) == [kind]
+
+
+@pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
+def test_strict_rules_count_each_thing_that_is_touched_once_a_contact(
+    kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
+) -> None:
+    soft, other = (Contact(contact, name, 0.0, at_fault=True) for name in ("a", "b"))
+    lasting = [frame(i, contacts=(soft, other)) for i in range(30)]
+    again = [frame(i, contacts=(soft,)) for i in range(45, 50)]
+    pause = [frame(i) for i in range(30, 45)]
+    strict = watched([*lasting, *pause, *again], STRICT)
+    assert kinds(strict) == [kind] * 3
+    assert strict.touches == strict.infractions
+    published = watched([*lasting, *pause, *again])
+    assert kinds(published) == []
+    assert len(published.touches) == 3
+
+
+def test_a_contact_that_flickers_is_one() -> None:
+    touch = (Contact(ContactKind.CAR, "it", 0.0, at_fault=True),)
+    assert len(watched([frame(i, contacts=touch if i % 3 else ()) for i in range(30)]).touches) == 1
 
 
 @pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
@@ -131,6 +179,11 @@ def test_only_red_counts_and_only_at_the_crossing() -> None:
     assert kinds(watched(late)) == []
 
 
+def test_nocrash_reports_a_yellow_light_that_is_crossed_and_nobody_is_to_blame() -> None:
+    (crossing,) = watched([frame(i, lights=light(LightState.YELLOW)) for i in range(40)], NOCRASH).infractions
+    assert (crossing.kind, crossing.at_fault) == (InfractionKind.YELLOW_LIGHT, False)
+
+
 def test_a_light_for_another_direction_does_not_count() -> None:
     for heading, counted in ((1.0, 1), (1.1, 0), (math.pi, 0), (-1.1, 0)):
         frames = [frame(i, lights=light(LightState.RED, heading)) for i in range(40)]
@@ -148,6 +201,13 @@ def test_goal_within_two_metres_is_success() -> None:
     assert referee.watch(frame(0, goal_distance=2.01)) is None
     assert referee.watch(frame(1, goal_distance=2.0)) is Outcome.SUCCESS
     assert referee.result().outcome is Outcome.SUCCESS
+
+
+def test_a_goal_behind_the_start_is_reached_by_driving_the_route_only() -> None:
+    referee = Referee(SCENARIO)
+    assert referee.watch(frame(0, goal_distance=1.0, route_done=0.0, route_length=700.0)) is None
+    assert referee.watch(frame(1, goal_distance=1.0, route_done=629.0, route_length=700.0)) is None
+    assert referee.watch(frame(2, goal_distance=1.0, route_done=631.0, route_length=700.0)) is Outcome.SUCCESS
 
 
 def test_time_is_up_at_the_limit_and_the_goal_goes_first() -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from statistics import median
+from statistics import median, stdev
 
 from caldrive.affordances import SPECS
-from caldrive.benchmark.suites import TrialResult
-from caldrive.results import InfractionKind, Outcome
+from caldrive.benchmark.suites import COLLISIONS, TrialResult
+from caldrive.driving.comfort import FRAME_METRICS
+from caldrive.results import Infraction, InfractionKind, Outcome
 
 Z95 = 1.959964  # of a normal distribution, two-sided
 # Leaderboard 2.1: what an infraction adds to the denominator of the driving score.
@@ -35,6 +36,8 @@ class Cell:
     """Mean share of the routes that was covered, in [0, 1]."""
     score: float
     """Mean driving score, in [0, 100]."""
+    deviation: float | None = None
+    """Standard deviation of the success rate over the suite's repetitions, percent; None where there is one only."""
 
     @property
     def percent(self) -> float:
@@ -83,7 +86,17 @@ def _cell(condition: str, task: str, members: Sequence[TrialResult]) -> Cell:
         clean=sum(is_clean(member) for member in members),
         completion=sum(route_completion(member) for member in members) / len(members),
         score=sum(driving_score(member) for member in members) / len(members),
+        deviation=_deviation(members),
     )
+
+
+def _deviation(members: Sequence[TrialResult]) -> float | None:
+    """Of the success rates of a cell's repetitions, percent, with n - 1 in the denominator."""
+    by_repetition: dict[int, list[bool]] = {}
+    for member in members:
+        by_repetition.setdefault(member.trial.repetition, []).append(succeeded(member))
+    rates = [100 * sum(successes) / len(successes) for successes in by_repetition.values()]
+    return stdev(rates) if len(rates) > 1 else None
 
 
 def succeeded(result: TrialResult) -> bool:
@@ -119,6 +132,9 @@ class InfractionRate:
 
     kind: InfractionKind
     count: int
+    """Whoever's fault it was."""
+    own: int
+    """Those that were the agent's."""
     km: float
     """The distance driven."""
 
@@ -129,29 +145,55 @@ class InfractionRate:
 
 
 def infraction_rates(results: Sequence[TrialResult]) -> list[InfractionRate]:
-    """Kilometres driven and infractions of each kind (table 2); collisions that others cause do not count."""
+    """Kilometres driven and infractions of each kind (table 2), whoever's fault they were, as CARLA counts them."""
+    return _rates(results, [i for result in results for i in result.episode.infractions])
+
+
+def touch_rates(results: Sequence[TrialResult]) -> list[InfractionRate]:
+    """Likewise everything that was touched, once a contact, however soft."""
+    rates = _rates(results, [touch for result in results for touch in result.episode.touches])
+    return [rate for rate in rates if rate.kind in COLLISIONS]
+
+
+def _rates(results: Sequence[TrialResult], infractions: Sequence[Infraction]) -> list[InfractionRate]:
     km = sum(result.episode.distance for result in results) / 1000
-    kinds = [i.kind for result in results for i in result.episode.infractions if i.at_fault]
-    return [InfractionRate(kind=kind, count=kinds.count(kind), km=km) for kind in InfractionKind]
+    kinds, own = [i.kind for i in infractions], [i.kind for i in infractions if i.at_fault]
+    return [InfractionRate(kind=kind, count=kinds.count(kind), own=own.count(kind), km=km) for kind in InfractionKind]
+
+
+def speeding(results: Sequence[TrialResult]) -> tuple[float, float]:
+    """Share of the time in [0, 1] that was faster than the signs allow, and by how much at most, km/h."""
+    seconds = sum(result.episode.duration for result in results)
+    too_fast = sum(result.episode.speeding * result.episode.duration for result in results)
+    worst = max((result.episode.worst_excess for result in results), default=0.0)
+    return (too_fast / seconds if seconds else 0.0), worst
 
 
 def mean_comfort(results: Sequence[TrialResult]) -> dict[str, float]:
     """The metrics of supplement 3.2 over all episodes: median of the episodes' median centre-line distances in m, and,
-    each episode weighted by its time, RMS jerks in m/s³ and the share of time within nuPlan's bounds."""
-    drives = [(result.episode.comfort, result.episode.duration) for result in results]
-
-    def mean(name: str, power: int, weights: Iterable[float]) -> float:
-        weighted = [(c[name] ** power, w) for (c, _), w in zip(drives, weights, strict=True)]
-        total = sum(w for _, w in weighted)
-        return (sum(v * w for v, w in weighted) / total) ** (1 / power) if total else 0.0
-
-    return {
-        "center_distance": median(c["center_distance"] for c, _ in drives) if drives else 0.0,
-        "jerk": mean("jerk", 2, (time for _, time in drives)),
-        "lateral_straight": mean("lateral_straight", 2, (max(0.0, time - c["turning"]) for c, time in drives)),
-        "lateral_turn": mean("lateral_turn", 2, (c["turning"] for c, _ in drives)),
-        "comfortable": mean("comfortable", 1, (time for _, time in drives)),
+    each episode weighted by its time, RMS jerks in m/s³, RMS changes of acceleration a frame in m/s² (where the
+    episodes have them), and the share of time within nuPlan's bounds."""
+    episodes = [(result.episode.comfort, result.episode.duration) for result in results]
+    seconds = {
+        "jerk": [duration for _, duration in episodes],
+        "lateral_straight": [max(0.0, duration - comfort["turning"]) for comfort, duration in episodes],
+        "lateral_turn": [comfort["turning"] for comfort, _ in episodes],
     }
+    jerks = {
+        name: math.sqrt(_mean([comfort[name] ** 2 for comfort, _ in episodes], seconds[name.removesuffix("_frame")]))
+        for name in (*seconds, *FRAME_METRICS)
+        if all(name in comfort for comfort, _ in episodes)
+    }
+    return {
+        "center_distance": median(comfort["center_distance"] for comfort, _ in episodes) if episodes else 0.0,
+        **jerks,
+        "comfortable": _mean([comfort["comfortable"] for comfort, _ in episodes], seconds["jerk"]),
+    }
+
+
+def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
+    total = sum(weights)
+    return sum(value * weight for value, weight in zip(values, weights, strict=True)) / total if total else 0.0
 
 
 def red_light_counts(results: Sequence[TrialResult]) -> tuple[int, int]:

@@ -1,8 +1,9 @@
-"""The paper's numbers, for the columns beside ours: success (table 1) and kilometres between infractions (table 2)."""
+"""Published numbers, for the columns beside ours: the paper's success (table 1) and kilometres between infractions
+(table 2), and CAL's success in NoCrash, which others drove (Codevilla et al. 2019)."""
 
 from __future__ import annotations
 
-from caldrive.benchmark.suites import CONDITIONS
+from caldrive.benchmark.suites import CONDITIONS, DENSITIES
 from caldrive.driving.tasks import TASKS
 from caldrive.results import InfractionKind
 
@@ -17,6 +18,8 @@ _SUCCESS = {
     "RL": ((89, 34, 14, 7), (86, 16, 2, 2), (74, 12, 3, 2), (68, 20, 6, 4)),
     "CAL": ((100, 97, 92, 83), (100, 96, 90, 82), (93, 82, 70, 64), (94, 72, 68, 64)),
 }
+# Percent of episodes: empty, regular, dense; a row for each condition.
+_NOCRASH = {"CAL": ((81, 73, 42), (85, 68, 33), (36, 26, 9), (25, 14, 10))}
 # A row for each condition, a column for each of SYSTEMS; `>` where no infraction occurred.
 _KM = {
     InfractionKind.OPPOSITE_LANE:
@@ -35,10 +38,11 @@ COMFORT = {"center_distance": 0.334, "jerk": 0.333, "lateral_straight": 0.052, "
 
 
 def success(system: str, condition: str, task: str) -> int | None:
-    """Percent of a system's episodes that reached their goal; None where the paper says nothing."""
-    if system not in _SUCCESS or condition not in CONDITIONS or task not in TASKS:
-        return None
-    return _SUCCESS[system][_ROWS.index(condition)][TASKS.index(task)]
+    """Percent of a system's episodes that reached their goal; None where nobody says."""
+    for tasks, table in ((TASKS, _SUCCESS), (tuple(DENSITIES), _NOCRASH)):
+        if system in table and condition in CONDITIONS and task in tasks:
+            return table[system][_ROWS.index(condition)][tasks.index(task)]
+    return None
 
 
 def km_between(system: str, condition: str, kind: InfractionKind) -> str:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from caldrive.benchmark.run_folder import RunFolder, trial_result
+from caldrive.benchmark.runner import make_referee
 from caldrive.benchmark.suites import Trial
 from caldrive.checks import require_writable_file
 from caldrive.datatypes import Step
-from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.setup import set_up
 from caldrive.progress import Progress, silent
@@ -54,7 +54,7 @@ def _film(folder: RunFolder, trial: Trial, out: Path, progress: Progress) -> Epi
     """Drives a trial as the folder's run did, and films it."""
     world, agent = set_up(folder.driver)
     with closing(world), VideoWriter(out, rate=1 / world.dt) as video:
-        referee = Referee(trial.scenario, trial.fatal)
+        referee = make_referee(folder.driver, trial)
         text = f"{caption(trial.scenario, 1, 1)}   {trial.key}"
         film = EpisodeFilm(video, world, trial.scenario, caption=text, infractions=referee.infractions, truth=True)
 

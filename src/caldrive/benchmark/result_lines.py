@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from caldrive.benchmark.suites import is_key
+from caldrive.datatypes import KMH
 from caldrive.driving.referee import GOAL_RADIUS
 from caldrive.files import json_line, read_json, write_whole
 from caldrive.results import EpisodeResult, Outcome, result_from_values
@@ -98,7 +99,9 @@ def _check_possible(result: EpisodeResult) -> None:
         raise ValueError(f"it took {result.duration:g} s of {result.scenario.time_limit:g} s")
     if result.distance > FASTEST * (result.duration + ONE_STEP):
         raise ValueError(f"it drove {result.distance:g} m in {result.duration:g} s")
-    for infraction in result.infractions:
+    if not (0 <= result.speeding <= 1 and 0 <= result.worst_excess < FASTEST / KMH):
+        raise ValueError(f"it was too fast for {result.speeding:g} of the time, by {result.worst_excess:g} km/h")
+    for infraction in (*result.infractions, *result.touches):
         if not 0 <= infraction.time <= result.duration + ONE_STEP:
             raise ValueError(f"a rule was broken at {infraction.time:g} s of {result.duration:g} s")
 

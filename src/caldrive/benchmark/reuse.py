@@ -1,5 +1,5 @@
-"""Episodes that another suite has driven already are taken over. NoCrash's empty and regular towns are the paper's
-navigation tasks, and a trial of the traffic school is one of NoCrash's that more infractions end."""
+"""Episodes that another suite has driven already are taken over: a trial of the traffic school is one of NoCrash's that
+more infractions end, and a run of a suite's part is part of the whole one's."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ def _without_name(scenario: Scenario) -> Scenario:
 
 
 def _ends_the_same(result: EpisodeResult, trial: Trial) -> bool:
-    """Whether the infractions that end the trial would have ended this episode where it ended."""
+    """Whether the infractions that end the trial were counted, and would have ended this episode where it ended."""
+    if result.rules != trial.rules:
+        return False
     fatal = [k for k, infraction in enumerate(result.infractions) if infraction.kind in trial.fatal]
     return fatal == ([len(result.infractions) - 1] if result.outcome is Outcome.FAILED else [])
 

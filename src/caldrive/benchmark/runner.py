@@ -22,6 +22,7 @@ from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_wri
 from caldrive.driving.own_code import OwnCodeError
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
+from caldrive.driving.rules import RULES
 from caldrive.driving.setup import set_up
 from caldrive.files import locked_folder
 from caldrive.interfaces import Agent, World
@@ -52,7 +53,7 @@ def _close_worker(driver: AgentSettings) -> None:
 def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
     """What a worker does: drives one trial, and returns all that is kept of it. Raises OwnCodeError with its key."""
     world, agent, provenance = _worker(driver)
-    referee = Referee(trial.scenario, trial.fatal)
+    referee = make_referee(driver, trial)
     metrics, artifacts = EpisodeMetrics(), EpisodeArtifacts(world, referee)
     try:
         result = run_episode(world, agent, trial.scenario, metrics.add, artifacts.add, referee=referee)
@@ -61,6 +62,11 @@ def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
     figures = {name: plain(value) for name, value in metrics.compute(result.infractions).items()}
     line = {"key": trial.key, "result": result_values(result), "figures": figures}
     return EpisodeRecord(line=line, files=artifacts.files(trial.key, result), provenance=provenance)
+
+
+def make_referee(driver: AgentSettings, trial: Trial) -> Referee:
+    """A trial's referee. A driver without a cap is told to obey the signs."""
+    return Referee(trial.scenario, trial.fatal, RULES[trial.rules], signs=driver.cap is None)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Suites: plain lists of trials. Those of the field are made here, anyone's own can be read from a JSON file.
 
 The conditions are those of the paper's tables: the training town and weathers, new weathers, the new town, and both.
+CoRL-2017's new weathers are 4 and 14, NoCrash's 10 and 14 (driving-benchmarks, `corl_2017.py` and `carla100`).
 """
 
 from __future__ import annotations
@@ -13,17 +14,18 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
+from caldrive.driving.rules import RULES
 from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, task_scenarios
 from caldrive.files import read_json
 from caldrive.results import EpisodeResult, InfractionKind
 from caldrive.scenarios import Scenario, scenario_from_values, scenario_values
 
-TRAINING_WEATHERS, NEW_WEATHERS = (1, 3, 6, 8), (4, 14)
-CONDITIONS = {  # town and weathers of each
-    "training": ("town01", TRAINING_WEATHERS),
-    "new weather": ("town01", NEW_WEATHERS),
-    "new town": ("town02", TRAINING_WEATHERS),
-    "new town + weather": ("town02", NEW_WEATHERS),
+TRAINING_WEATHERS, NEW_WEATHERS, NOCRASH_NEW_WEATHERS = (1, 3, 6, 8), (4, 14), (10, 14)
+CONDITIONS = {  # town, and whether its weathers are those of the training
+    "training": ("town01", True),
+    "new weather": ("town01", False),
+    "new town": ("town02", True),
+    "new town + weather": ("town02", False),
 }
 DENSITIES = {  # NoCrash's tasks: cars and people in each town
     "empty": {"town01": (0, 0), "town02": (0, 0)},
@@ -33,6 +35,7 @@ DENSITIES = {  # NoCrash's tasks: cars and people in each town
 COLLISIONS = (InfractionKind.COLLISION_CAR, InfractionKind.COLLISION_OBJECT, InfractionKind.COLLISION_PERSON)
 TRAFFIC_RULES = (*COLLISIONS, InfractionKind.RED_LIGHT, InfractionKind.OPPOSITE_LANE, InfractionKind.SIDEWALK)
 QUICK_ROUTES, QUICK_WEATHERS = 2, (1, 14)
+NOCRASH_SEEDS = 3  # its tables are means and deviations over so many
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,10 @@ class Trial:
     """Where and among whom it drives."""
     fatal: tuple[InfractionKind, ...] = ()
     """Infractions that end the episode as a failure."""
+    rules: str = "corl2017"
+    """What counts as an infraction: a name in `driving.rules.RULES`."""
+    repetition: int = 0
+    """Which time, from 0 on, the suite drives this with another seed."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +68,13 @@ class TrialResult:
     """Those of `EpisodeMetrics`, by name."""
 
 
-def _by_weather() -> Iterator[tuple[str, str, int]]:
+def _by_weather(new: tuple[int, ...]) -> Iterator[tuple[str, str, int]]:
     """Condition, town and weather: each condition's first weather, then each one's second, and so on, so that a run
-    broken off early has seen something of every cell."""
-    columns = ([(name, town, weather) for weather in weathers] for name, (town, weathers) in CONDITIONS.items())
+    broken off early has seen something of every cell. new: the weathers that are not the training's."""
+    columns = (
+        [(name, town, weather) for weather in (TRAINING_WEATHERS if known else new)]
+        for name, (town, known) in CONDITIONS.items()
+    )
     for row in zip_longest(*columns):
         yield from (cell for cell in row if cell is not None)
 
@@ -76,7 +86,7 @@ def _seed(seed: int, weather: int) -> int:
 
 def _corl2017(seed: int, time_limit: str, routes: int = ROUTES_PER_TASK) -> Iterator[Trial]:
     """The CoRL-2017 benchmark: the four tasks in each condition and weather."""
-    for condition, town, weather in _by_weather():
+    for condition, town, weather in _by_weather(NEW_WEATHERS):
         for task in TASKS:
             chosen = task_scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)[:routes]
             for k, scenario in enumerate(chosen):
@@ -91,7 +101,7 @@ def _corl2017_once(seed: int, time_limit: str) -> list[Trial]:
     """Each route of each cell in one of its weathers, which take turns; the first of each cell before the second."""
 
     def is_its_turn(trial: Trial) -> bool:
-        weathers = CONDITIONS[trial.condition][1]
+        weathers = TRAINING_WEATHERS if CONDITIONS[trial.condition][1] else NEW_WEATHERS
         return trial.scenario.weather == weathers[_route(trial) % len(weathers)]
 
     return sorted(filter(is_its_turn, _corl2017(seed, time_limit)), key=_route)
@@ -103,25 +113,45 @@ def _quick(seed: int, time_limit: str) -> list[Trial]:
     return [trial for trial in trials if trial.scenario.weather in QUICK_WEATHERS]
 
 
-def _nocrash(seed: int, time_limit: str, fatal: tuple[InfractionKind, ...]) -> Iterator[Trial]:
-    """The NoCrash benchmark: navigation in each density of traffic, with infractions that end an episode."""
-    for condition, town, weather in _by_weather():
-        for density, traffic in DENSITIES.items():
-            cars, people = traffic[town]
-            chosen = task_scenarios(
-                town, "navigation", weather, cars=cars, people=people, seed=_seed(seed, weather), time_limit=time_limit,
-                name=density,
-            )  # fmt: skip
-            for k, scenario in enumerate(chosen):
-                key = f"{town}-w{weather:02d}-{density}-{k:02d}"
-                yield Trial(key=key, condition=condition, scenario=scenario, fatal=fatal)
+def _nocrash(seed: int, fatal: tuple[InfractionKind, ...]) -> Iterator[Trial]:
+    """The NoCrash benchmark: its routes in each density of traffic, with infractions that end an episode, three times
+    with other traffic."""
+    for repetition in range(NOCRASH_SEEDS):
+        for condition, town, weather in _by_weather(NOCRASH_NEW_WEATHERS):
+            for density, traffic in DENSITIES.items():
+                cars, people = traffic[town]
+                chosen = task_scenarios(
+                    town, "nocrash", weather, cars=cars, people=people, time_limit="nocrash", name=density,
+                    seed=_seed(NOCRASH_SEEDS * seed + repetition, weather),
+                )  # fmt: skip
+                for k, scenario in enumerate(chosen):
+                    yield Trial(
+                        key=f"{town}-w{weather:02d}-{density}-{k:02d}-s{repetition}", condition=condition,
+                        scenario=scenario, fatal=fatal, rules="nocrash", repetition=repetition,
+                    )  # fmt: skip
+
+
+def _require_own_time_limit(time_limit: str) -> None:
+    """Raises ValueError where a suite with a time limit of its own is given another."""
+    if time_limit != "paper":
+        raise ValueError(
+            f"found --time-limit {time_limit}, wanted none: NoCrash's is the path at 5 km/h plus 20 s, leave it out"
+        )
+
+
+def _nocrash_suite(fatal: tuple[InfractionKind, ...]) -> Callable[[int, str], list[Trial]]:
+    def trials(seed: int, time_limit: str) -> list[Trial]:
+        _require_own_time_limit(time_limit)
+        return list(_nocrash(seed, fatal))
+
+    return trials
 
 
 SUITES: Mapping[str, Callable[[int, str], list[Trial]]] = {  # by name; of a seed and a kind of time limit
     "corl2017": lambda seed, time_limit: list(_corl2017(seed, time_limit)),
     "corl2017-once": _corl2017_once,
-    "nocrash": lambda seed, time_limit: list(_nocrash(seed, time_limit, COLLISIONS)),
-    "traffic-school": lambda seed, time_limit: list(_nocrash(seed, time_limit, TRAFFIC_RULES)),
+    "nocrash": _nocrash_suite(COLLISIONS),
+    "traffic-school": _nocrash_suite(TRAFFIC_RULES),
     "quick": _quick,
 }
 
@@ -146,6 +176,8 @@ def to_json(trials: list[Trial]) -> str:
             "key": trial.key,
             "condition": trial.condition,
             "fatal": [kind.value for kind in trial.fatal],
+            "rules": trial.rules,
+            "repetition": trial.repetition,
             "scenario": scenario_values(trial.scenario),
         }
         for trial in trials
@@ -160,6 +192,8 @@ class _Row(TypedDict):
     condition: str
     scenario: dict[str, Any]
     fatal: NotRequired[tuple[InfractionKind, ...]]
+    rules: NotRequired[str]
+    repetition: NotRequired[int]
 
 
 def is_key(text: str) -> bool:
@@ -168,12 +202,14 @@ def is_key(text: str) -> bool:
 
 
 def _trial(row: _Row) -> Trial:
-    """Raises ValueError where the key holds other signs, or the scenario cannot be."""
+    """Raises ValueError where the key holds other signs, the rules are unknown, or the scenario cannot be."""
     if not is_key(row["key"]):
         raise ValueError(f"found key {row['key']!r}, wanted letters, digits, -, _ and .")
+    if (rules := row.get("rules", "corl2017")) not in RULES:
+        raise ValueError(f"found rules {rules!r}, wanted {', '.join(RULES)}")
     return Trial(
         key=row["key"], condition=row["condition"], scenario=scenario_from_values(row["scenario"]),
-        fatal=row.get("fatal", ()),
+        fatal=row.get("fatal", ()), rules=rules, repetition=row.get("repetition", 0),
     )  # fmt: skip
 
 

@@ -66,7 +66,7 @@ def drive(settings: DriveSettings, progress: Progress = silent) -> DriveReport:
         VideoWriter(settings.out / "drive.mp4", rate=1 / world.dt) as video,
     ):
         for k, scenario in enumerate(scenarios):
-            trace, referee = Trace(), Referee(scenario)
+            trace, referee = Trace(), Referee(scenario, signs=settings.cap is None)
             text = caption(scenario, k + 1, len(scenarios))
             film = EpisodeFilm(video, world, scenario, caption=text, infractions=referee.infractions, truth=show_truth)
             watchers = [trace.add, _reporter(progress, scenario, k, len(scenarios))]

@@ -1,7 +1,8 @@
 """The referee: watches the truth and nothing else, says when an episode ends and which rules were broken.
 
 Counting follows the CoRL-2017 benchmark: a lane or sidewalk infraction is a rise of the car's share there within 10
-frames, a collision an impulse above a threshold, and each kind then rests for some frames before it counts again.
+frames, a collision an impulse above what the `rules` say, and each kind then rests for some frames before it counts
+again. Every touch, however soft, is noted beside.
 """
 
 from __future__ import annotations
@@ -10,29 +11,30 @@ import math
 from collections import deque
 from collections.abc import Collection
 
-from caldrive.datatypes import ContactKind, LightState, TrafficLight, Truth, VehicleState
+from caldrive.datatypes import Contact, LightState, TrafficLight, Truth, VehicleState
 from caldrive.driving.comfort import comfort
+from caldrive.driving.rules import (
+    APART_FRAMES,
+    COLLISION,
+    CORL2017,
+    CROSSING,
+    MOST_FRAMES,
+    REST_FRAMES,
+    RISE_FRAMES,
+    SHARE_RISE,
+    Intensity,
+    Rules,
+)
+from caldrive.driving.speeding import SpeedWatch
 from caldrive.geometry import moved, wrap_angle
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 
 GOAL_RADIUS = 2.0  # m
-RISE_FRAMES = 10
+ROUTE_SHARE = (
+    0.9  # of the route that has to be driven: where start and goal lie near each other, standing is no success
+)
 NEVER = -1000  # a frame long before the first one
-REST_FRAMES = {
-    InfractionKind.OPPOSITE_LANE: 20,
-    InfractionKind.SIDEWALK: 20,
-    InfractionKind.RED_LIGHT: 20,
-    InfractionKind.COLLISION_OBJECT: 20,
-    InfractionKind.COLLISION_CAR: 30,
-    InfractionKind.COLLISION_PERSON: 100,
-}
-SHARE_RISE = {InfractionKind.OPPOSITE_LANE: 0.4, InfractionKind.SIDEWALK: 0.3}
-COLLISIONS = {  # kind and impulse in N s above which it counts
-    ContactKind.OBJECT: (InfractionKind.COLLISION_OBJECT, 400.0),
-    ContactKind.CAR: (InfractionKind.COLLISION_CAR, 400.0),
-    ContactKind.PERSON: (InfractionKind.COLLISION_PERSON, 300.0),
-}
 MAX_LIGHT_ANGLE = math.radians(60)  # a light further off the ego's heading is for others
 
 
@@ -58,25 +60,37 @@ def crosses(light: TrafficLight, before: tuple[float, float], after: tuple[float
     return 0 <= tx * (x - ax) + ty * (y - ay) <= length
 
 
-def runs_red(light: TrafficLight, last: VehicleState, ego: VehicleState) -> bool:
-    """Whether the ego's front crossed this light's stop line while it showed red to the ego."""
+def runs(light: TrafficLight, last: VehicleState, ego: VehicleState) -> bool:
+    """Whether the ego's front crossed this light's stop line, and the light was meant for it."""
     turned = abs(wrap_angle(light.pose.heading - ego.pose.heading))
-    return light.state is LightState.RED and turned <= MAX_LIGHT_ANGLE and crosses(light, front(last), front(ego))
+    return turned <= MAX_LIGHT_ANGLE and crosses(light, front(last), front(ego))
 
 
 class Referee:
     """One episode's referee.
 
-    fatal: infractions that end the episode as a failure. infractions: those so far, each once, with its time and place.
-    outcome: None while the episode goes on.
+    fatal: infractions that end the episode as a failure. rules: what counts as one. signs: whether the speed signs
+    count, too, or the car is told another speed. infractions: those so far, each once, with its time and place.
+    touches: likewise everything that was touched. outcome: None while the episode goes on.
     """
 
-    def __init__(self, scenario: Scenario, fatal: Collection[InfractionKind] = ()) -> None:
-        self.scenario, self.fatal = scenario, fatal
+    def __init__(
+        self,
+        scenario: Scenario,
+        fatal: Collection[InfractionKind] = (),
+        rules: Rules = CORL2017,
+        *,
+        signs: bool = False,
+    ) -> None:
+        self.scenario, self.fatal, self.rules, self.signs = scenario, fatal, rules, signs
         self.infractions: list[Infraction] = []
+        self.touches: list[Infraction] = []
         self.outcome: Outcome | None = None
         self._last_counted: dict[tuple[InfractionKind, bool], int] = {}  # frame of the last one of its kind and fault
         self._shares = {kind: deque[float](maxlen=RISE_FRAMES + 1) for kind in SHARE_RISE}
+        self._contacts = deque[tuple[Contact, ...]](maxlen=MOST_FRAMES)
+        self._touched: dict[str, int] = {}  # frame of the last touch, by what was touched
+        self._speed = SpeedWatch()
         self._last: Truth | None = None
         self._distance = 0.0
         self._times: list[float] = []
@@ -89,10 +103,13 @@ class Referee:
         self._watch_shares(truth)
         self._watch_contacts(truth)
         self._watch_lights(truth)
+        if self._speed.is_too_fast(truth) and self.signs:
+            self._count(InfractionKind.SPEEDING, truth)
+            self._last_counted[InfractionKind.SPEEDING, True] = len(self._times)  # it lasts
         self._keep(truth)
         if any(infraction.kind in self.fatal for infraction in self.infractions):
             self.outcome = Outcome.FAILED
-        elif truth.goal_distance <= GOAL_RADIUS:
+        elif is_there(truth):
             self.outcome = Outcome.SUCCESS
         elif truth.time >= self.scenario.time_limit:
             self.outcome = Outcome.TIMEOUT
@@ -109,7 +126,11 @@ class Referee:
             route_done=last.route_done if last else 0.0,
             route_length=last.route_length if last else math.inf,
             infractions=tuple(self.infractions),
+            rules=self.rules.name,
+            touches=tuple(self.touches),
             comfort=comfort(self._times, self._speeds, self._headings, self._centers),
+            speeding=self._speed.share,
+            worst_excess=self._speed.worst,
         )
 
     def _watch_shares(self, truth: Truth) -> None:
@@ -124,25 +145,43 @@ class Referee:
                 self._count(kind, truth)
 
     def _watch_contacts(self, truth: Truth) -> None:
+        self._contacts.append(truth.contacts)
         for contact in truth.contacts:
-            kind, threshold = COLLISIONS[contact.kind]
-            if contact.impulse > threshold:
-                self._count(kind, truth, contact.at_fault)
+            name = f"{contact.kind.value} {contact.id}"
+            if len(self._times) - self._touched.get(name, NEVER) > APART_FRAMES:
+                touch = _infraction(COLLISION[contact.kind], truth, contact.at_fault)
+                self.touches.append(touch)
+                if self.rules.collisions is None:
+                    self.infractions.append(touch)
+            self._touched[name] = len(self._times)
+        if self.rules.collisions is None:
+            return
+        for contact in truth.contacts:
+            if (at_fault := self._hit(contact, self.rules.collisions[contact.kind])) is not None:
+                self._count(COLLISION[contact.kind], truth, at_fault)
+
+    def _hit(self, contact: Contact, intensity: Intensity) -> bool | None:
+        """Whose fault the collision was that contacts like this one add up to, None where they are too soft."""
+        recent = [c for frame in list(self._contacts)[-intensity.frames :] for c in frame if c.kind is contact.kind]
+        is_hard = sum(other.impulse for other in recent) > intensity.least
+        return any(other.at_fault for other in recent) if is_hard else None
 
     def _watch_lights(self, truth: Truth) -> None:
         if self._last is None:
             return
-        if any(runs_red(light, self._last.ego, truth.ego) for light in truth.lights):
-            self._count(InfractionKind.RED_LIGHT, truth)
+        for light in truth.lights:
+            if light.state in self.rules.closed and runs(light, self._last.ego, truth.ego):
+                self._count(CROSSING[light.state], truth, at_fault=light.state is LightState.RED)
 
     def _count(self, kind: InfractionKind, truth: Truth, at_fault: bool = True) -> None:
-        """One more infraction, unless one of its kind and fault was counted shortly before."""
-        frame = len(self._times)
-        if frame - self._last_counted.get((kind, at_fault), NEVER) <= REST_FRAMES[kind]:
-            return
+        """One more infraction, unless one of its kind was counted shortly before; others' faults hide none of one's
+        own."""
+        frame, rest = len(self._times), REST_FRAMES[kind]
+        for fault in (True,) if at_fault else (True, False):
+            if frame - self._last_counted.get((kind, fault), NEVER) <= rest:
+                return
         self._last_counted[kind, at_fault] = frame
-        place = truth.ego.pose
-        self.infractions.append(Infraction(kind=kind, time=truth.time, x=place.x, y=place.y, at_fault=at_fault))
+        self.infractions.append(_infraction(kind, truth, at_fault))
 
     def _keep(self, truth: Truth) -> None:
         """What the result is made of."""
@@ -154,3 +193,14 @@ class Referee:
         self._speeds.append(truth.ego.speed)
         self._headings.append(truth.ego.pose.heading)
         self._centers.append(truth.affordances.center_distance)
+
+
+def is_there(truth: Truth) -> bool:
+    """Whether the ego is at its goal, and has driven there; a world without a route does not say how."""
+    has_driven = math.isinf(truth.route_length) or truth.route_done >= ROUTE_SHARE * truth.route_length
+    return truth.goal_distance <= GOAL_RADIUS and has_driven
+
+
+def _infraction(kind: InfractionKind, truth: Truth, at_fault: bool) -> Infraction:
+    place = truth.ego.pose
+    return Infraction(kind=kind, time=truth.time, x=place.x, y=place.y, at_fault=at_fault)

@@ -1,8 +1,9 @@
 """The four tasks of the benchmark (section 4), their routes and their scenarios: going straight, one turn, navigation,
 and navigation among other cars and people.
 
-The package's towns have 25 fixed routes for each task, in routes.json; `python -m caldrive.driving.tasks` draws them
-again. On other maps routes are drawn from a seed.
+The package's towns have 25 fixed routes for each task, in routes.json; `python -m caldrive.driving.tasks` draws those
+that are missing there. On other maps routes are drawn from a seed. NoCrash has its own routes, of which 5 in town 1 are
+not those of CoRL-2017's navigation.
 """
 
 from __future__ import annotations
@@ -23,6 +24,11 @@ from caldrive.world.roads.route import Route, plan_route
 from caldrive.world.roads.towns import load_roads
 
 TASKS = ("straight", "one-turn", "navigation", "navigation-dynamic")
+TIME_LIMITS = {  # km/h at which the path has to be driven, and s beside
+    "paper": (10.0, 0.0),  # section 4
+    "code": (5.0, 10.0),  # the authors' published code
+    "nocrash": (5.0, 20.0),  # driving-benchmarks, `carla100`
+}
 ROUTES_PER_TASK = 25
 USUAL_TRAFFIC = {"town01": (20, 50), "town02": (15, 50)}  # cars and people of the dynamic task
 OTHER_TOWNS_TRAFFIC = (20, 50)
@@ -34,6 +40,7 @@ _LENGTHS = {"straight": (90.0, 300.0), "one-turn": (130.0, 420.0), "navigation":
 _FULL_DIAGONAL = 520.0  # m, town01's
 _MAX_BEND = 0.2  # rad between the ends of a straight route
 _TRIES = 200  # for each route to draw
+_NOCRASH_OWN = {"town01": 5, "town02": 0}  # routes of NoCrash that are none of the navigation's
 
 
 def _fits(route: Route, task: str) -> bool:
@@ -83,19 +90,20 @@ def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
 
     Raises ValueError for an unknown task and a map that is too small for it.
     """
-    if task not in TASKS:
+    if task not in (*TASKS, "nocrash"):
         raise ValueError(f"found task {task!r}, wanted one of {', '.join(TASKS)}: type --task navigation")
     kind = "navigation" if task == "navigation-dynamic" else task
     if town in TOWNS:
         return [(Pose(*start), Pose(*goal)) for start, goal in _fixed_routes()[town][kind]]
+    kind = "navigation" if kind == "nocrash" else kind
     return draw_routes(load_roads(town), kind, ROUTES_PER_TASK, np.random.default_rng(seed))
 
 
 @lru_cache(maxsize=4096)  # the same in all weathers
 def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
-    """Seconds. kind: `paper` or `code`, as in `scenarios`."""
-    route = plan_route(load_roads(town), start, goal)
-    return route.time_limit if kind == "paper" else route.length / (5 * KMH) + 10
+    """Seconds. kind: a name in TIME_LIMITS."""
+    speed, beside = TIME_LIMITS[kind]
+    return plan_route(load_roads(town), start, goal).length / (speed * KMH) + beside
 
 
 def task_scenarios(
@@ -112,10 +120,10 @@ def task_scenarios(
     """The 25 scenarios of a task.
 
     cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02).
-    time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s. name: the scenarios' task,
+    task: `nocrash` has that benchmark's routes. time_limit: a name in TIME_LIMITS. name: the scenarios' task,
     where it is called something else. Raises ValueError for an unknown task or time limit.
     """
-    if time_limit not in ("paper", "code"):
+    if time_limit not in TIME_LIMITS:
         raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: type --time-limit paper")
     usual = USUAL_TRAFFIC.get(town, OTHER_TOWNS_TRAFFIC) if task == "navigation-dynamic" else (0, 0)
     return [
@@ -128,21 +136,24 @@ def task_scenarios(
     ]  # fmt: skip
 
 
-def _draw_all() -> None:
-    """Draws the fixed routes of the package's towns again."""
-    rng = np.random.default_rng(2018)
-    drawn = {
-        town: {
-            task: [
-                [[round(value, 3) for value in astuple(pose)] for pose in pair]
-                for pair in draw_routes(load_roads(town), task, ROUTES_PER_TASK, rng)
-            ]
-            for task in _LENGTHS
-        }
-        for town in TOWNS
-    }
+def _drawn(town: str, task: str, n: int, rng: np.random.Generator) -> list[list[list[float]]]:
+    """Random routes as in the file."""
+    pairs = draw_routes(load_roads(town), task, n, rng) if n else []
+    return [[[round(value, 3) for value in astuple(pose)] for pose in pair] for pair in pairs]
+
+
+def _draw_missing() -> None:
+    """Draws the fixed routes that the file lacks; those that it has were drawn when the towns were made, and stay."""
+    drawn = json.loads(_DATA.read_text())
+    for town in TOWNS:
+        of_town = drawn.setdefault(town, {})
+        for number, task in enumerate(_LENGTHS):
+            if task not in of_town:
+                of_town[task] = _drawn(town, task, ROUTES_PER_TASK, np.random.default_rng([2018, number]))
+        own = _drawn(town, "navigation", _NOCRASH_OWN[town], np.random.default_rng(2019))
+        of_town.setdefault("nocrash", of_town["navigation"][: ROUTES_PER_TASK - len(own)] + own)
     _DATA.write_text(json.dumps(drawn, indent=None, separators=(",", ":")) + "\n")
 
 
 if __name__ == "__main__":
-    _draw_all()
+    _draw_missing()

@@ -24,7 +24,8 @@ from caldrive.world.roads.towns import load_roads
 RUN_COLORS = ("#1f4e79", "#c8782d", "#4f8a4c", "#8a4c86", "#777777")
 RUN_MARKERS = "os^Dv"
 SYSTEM_MARKERS = dict(zip(SYSTEMS, "xv^D", strict=True))
-KIND_COLORS = dict(zip(InfractionKind, ("#e0a100", "#8a4c86", "#d9534f", "#444444", "#1f77b4", "#e377c2"), strict=True))
+_COLORS = ("#e0a100", "#8a4c86", "#d9534f", "#444444", "#1f77b4", "#e377c2", "#f0d000", "#2ca02c")
+KIND_COLORS = dict(zip(InfractionKind, _COLORS, strict=True))
 BIN, BINS = 5.0, 240  # s of a bin of time, and how many there are; the last one takes what is later
 MIN_STEPS = 50  # in a bin, from which its mean is drawn
 

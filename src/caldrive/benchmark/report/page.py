@@ -11,8 +11,8 @@ from pathlib import Path
 from caldrive.benchmark.artifacts import read_still, still_paths
 from caldrive.benchmark.metrics import succeeded
 from caldrive.benchmark.report.figures import errors_figure, map_figure, speed_figure, success_figure
-from caldrive.benchmark.report.runs import BenchmarkRun, Failure, failures
-from caldrive.benchmark.report.tables import Table, counted, headline, tables
+from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Table, failures
+from caldrive.benchmark.report.tables import counted, headline, tables
 
 _DATA = Path(__file__).parent
 MAX_STILLS = 120  # on one page; beyond that it would be long to open and large to keep

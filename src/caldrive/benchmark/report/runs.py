@@ -16,7 +16,7 @@ from caldrive.benchmark.metrics import Cell, cells, is_clean
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import TrialResult
-from caldrive.driving.comfort import METRICS
+from caldrive.driving.comfort import FRAME_METRICS, METRICS
 from caldrive.plugins import short_name
 from caldrive.results import WITHOUT_END
 
@@ -72,6 +72,19 @@ class BenchmarkRun:
 
 
 @dataclass(frozen=True)
+class Table:
+    """A table of the report."""
+
+    title: str
+    text: str
+    """A sentence on it."""
+    head: tuple[str, ...]
+    """The names of its columns."""
+    rows: tuple[tuple[str, ...], ...]
+    """Each as long as the head."""
+
+
+@dataclass(frozen=True)
 class Failure:
     """An episode that missed its goal or broke a rule."""
 
@@ -106,7 +119,7 @@ def load_run(path: Path) -> BenchmarkRun:
 
 def _is_whole(result: TrialResult) -> bool:
     """Whether a result has all the figures that the report's tables are made of."""
-    return result.episode.comfort.keys() >= set(METRICS) and "reds_obeyed" in result.metrics
+    return result.episode.comfort.keys() >= set(METRICS) - set(FRAME_METRICS) and "reds_obeyed" in result.metrics
 
 
 def load_runs(folders: Sequence[Path]) -> list[BenchmarkRun]:

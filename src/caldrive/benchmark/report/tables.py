@@ -2,48 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from caldrive.affordances import BY_NAME, AffordanceSpec
 from caldrive.benchmark.failure_causes import common_places
 from caldrive.benchmark.metrics import (
     Cell,
-    infraction_rates,
     mean_comfort,
     mean_errors,
-    red_light_counts,
     succeeded,
 )
-from caldrive.benchmark.published import COMFORT, SYSTEMS, km_between, success
-from caldrive.benchmark.report.runs import BenchmarkRun, cells_by_place, conditions
-from caldrive.benchmark.suites import TrialResult
+from caldrive.benchmark.published import COMFORT, SYSTEMS, success
+from caldrive.benchmark.report.infraction_tables import (
+    infractions_table,
+    of_tasks,
+    published_heads,
+    red_lights_table,
+    speeding_table,
+    touches_table,
+)
+from caldrive.benchmark.report.runs import BenchmarkRun, Table, cells_by_place, conditions
 
-DYNAMIC, ALL = "navigation-dynamic", "all"  # tasks whose infractions are counted together
+STATIC = "navigation"  # the task whose comfort the paper gives
 COMFORT_HEADS = {
-    "center_distance": "centre distance, median m", "jerk": "jerk m/s³", "lateral_straight": "lateral, straight",
-    "lateral_turn": "lateral, turns", "comfortable": "in nuPlan's bounds %",
+    "center_distance": "centre distance, median m",
+    "jerk": "jerk m/s³", "lateral_straight": "lateral, straight m/s³", "lateral_turn": "lateral, turns m/s³",
+    "jerk_frame": "a frame m/s²", "lateral_straight_frame": "lateral, straight, a frame m/s²",
+    "lateral_turn_frame": "lateral, turns, a frame m/s²", "comfortable": "in nuPlan's bounds %",
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of the report."""
-
-    title: str
-    text: str
-    """A sentence on it."""
-    head: tuple[str, ...]
-    """The names of its columns."""
-    rows: tuple[tuple[str, ...], ...]
-    """Each as long as the head."""
 
 
 def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
     """All tables of the report: the runs, their success, and of the others those that are not empty."""
     others = [
-        _infractions(runs), _red_lights(runs), _comfort(runs), _affordance_errors(runs), _failure_causes(runs)
+        infractions_table(runs), touches_table(runs), red_lights_table(runs), speeding_table(runs), _comfort(runs),
+        _affordance_errors(runs), _failure_causes(runs),
     ]  # fmt: skip
     return [_runs(runs), _success(runs), *(table for table in [_problems(runs), *others] if table.rows)]
 
@@ -95,11 +89,12 @@ def _success(runs: Sequence[BenchmarkRun]) -> Table:
         rows.append((condition, task, *ours, *("" if value is None else str(value) for value in published)))
     heads = [f"{run.name} {metric}" for run in runs for metric in ("%", "clean %", "route %", "score")]
     text = (
-        "Percent of the episodes that reached their goal in time, with Wilson's 95 % interval; percent that did so "
+        "Percent of the episodes that reached their goal in time, with Wilson's 95 % interval, and with the standard "
+        "deviation where a suite drives several times; percent that did so "
         "clean, without an infraction of their own fault; share of the routes covered; driving score of Leaderboard "
-        "2.1. The paper's systems drove in CARLA."
+        "2.1. The published systems drove in CARLA."
     )
-    head = ("condition", "task", *heads, *_published_heads())
+    head = ("condition", "task", *heads, *published_heads())
     return Table(title="Success", text=text, head=head, rows=tuple(rows))
 
 
@@ -108,65 +103,37 @@ def _cell_texts(cell: Cell | None) -> tuple[str, str, str, str]:
     if cell is None:
         return "", "", "", ""
     low, high = cell.interval
+    deviation = "" if cell.deviation is None else f" ± {cell.deviation:.0f}"
     return (
-        f"{cell.percent:.0f} ({low:.0f}-{high:.0f}, {cell.successes} of {cell.episodes})",
+        f"{cell.percent:.0f}{deviation} ({low:.0f}-{high:.0f}, {cell.successes} of {cell.episodes})",
         f"{100 * cell.clean / cell.episodes:.0f}",
         f"{100 * cell.completion:.0f}",
         f"{cell.score:.0f}",
     )
 
 
-def _published_heads() -> tuple[str, ...]:
-    return tuple(f"{system} (paper)" for system in SYSTEMS)
-
-
-def _infractions(runs: Sequence[BenchmarkRun]) -> Table:
-    rows = []
-    for condition in conditions(runs):
-        for tasks in (DYNAMIC, ALL):
-            rates = [infraction_rates(_of_tasks(run.of_condition(condition), tasks)) for run in runs]
-            if not any(rates_of_run[0].km for rates_of_run in rates):
-                continue
-            for rates_of_kind in zip(*rates, strict=True):
-                kind = rates_of_kind[0].kind
-                published = [km_between(system, condition, kind) if tasks == DYNAMIC else "" for system in SYSTEMS]
-                ours = (f"{rate.km_between} ({rate.count})" for rate in rates_of_kind)
-                rows.append((condition, tasks, kind.value, *ours, *published))
-    text = (
-        "Kilometres between two infractions and how many there were; > where there was none in so many kilometres. "
-        "The paper counts infractions in the task navigation-dynamic only."
-    )
-    head = ("condition", "tasks", "infraction", *(run.name for run in runs), *_published_heads())
-    return Table(title="Infractions", text=text, head=head, rows=tuple(rows))
-
-
-def _of_tasks(results: Sequence[TrialResult], tasks: str) -> list[TrialResult]:
-    return [result for result in results if tasks in (ALL, result.trial.scenario.task)]
-
-
-def _red_lights(runs: Sequence[BenchmarkRun]) -> Table:
-    rows = []
-    for condition in conditions(runs):
-        for run in runs:
-            met, ran = red_light_counts(run.of_condition(condition))
-            share = f"{100 * (met - ran) / met:.1f}" if met else ""
-            rows.append((condition, run.name, str(met), str(met - ran), share))
-    text = "Red lights that an agent stopped for or ran; those that turned green before it stood do not count."
-    return Table(title="Red lights", text=text, head=("condition", "agent", "met", "obeyed", "%"), rows=tuple(rows))
-
-
 def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for run in runs:
-        for condition in ("all", *conditions([run])):
-            means = mean_comfort(run.results if condition == "all" else run.of_condition(condition))
-            values = (f"{100 * v:.1f}" if name == "comfortable" else f"{v:.3f}" for name, v in means.items())
-            rows.append((run.name, condition, *values))
-    published = (f"{COMFORT[name]:.3f}" if name in COMFORT else "" for name in COMFORT_HEADS)
-    rows.append(("CAL (paper)", "training", *published))
-    text = "Median distance to the centre line and RMS jerk (supplement 3.2), and the share of time in comfort."
-    head = ("agent", "condition", *COMFORT_HEADS.values())
+        groups = {"all": list(run.results)} | {name: run.of_condition(name) for name in conditions([run])}
+        if any(of_tasks(run.results, STATIC)):
+            groups = {f"{STATIC}, all conditions": of_tasks(run.results, STATIC)} | groups
+        for name, results in groups.items():
+            rows.append((run.name, name, *_comfort_texts(mean_comfort(results))))
+    rows.append(("CAL (paper)", f"{STATIC}, all conditions", *_comfort_texts(COMFORT)))
+    text = (
+        "Median distance to the centre line and RMS jerk (supplement 3.2, over static navigation in all conditions), "
+        "the change of acceleration from frame to frame, which has the scale of the paper's figures, and the share of "
+        "time in comfort."
+    )
+    head = ("agent", "where", *COMFORT_HEADS.values())
     return Table(title="Driving behaviour", text=text, head=head, rows=tuple(rows))
+
+
+def _comfort_texts(means: Mapping[str, float]) -> list[str]:
+    """One for each of COMFORT_HEADS, empty where it is not known."""
+    texts = {name: f"{100 * mean:.1f}" if name == "comfortable" else f"{mean:.3f}" for name, mean in means.items()}
+    return [texts.get(name, "") for name in COMFORT_HEADS]
 
 
 def _affordance_errors(runs: Sequence[BenchmarkRun]) -> Table:
