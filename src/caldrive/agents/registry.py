@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from caldrive.agents.blind import require_affordances
 from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
 from caldrive.datatypes import CameraConfig
@@ -160,7 +161,11 @@ def _require_taken(agent: str, taken: Sequence[str], settings: AgentSettings, hi
 
 def provenance(settings: AgentSettings) -> dict[str, Any]:
     """What results depend on in the process that drives, beside its settings: digests of the network, of the agent's
-    code and of the controller's, and the network's precision; None for what there is not."""
+    code and of the controller's, and the network's precision; None for what there is not.
+
+    Raises ValueError where no such agent can be made.
+    """
+    require_affordances(settings.blind)
     return {
         "model": None, "precision": None, "agent_source": None,
         "controller_source": controller_source(settings.controller),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from tyro.conf import UseAppendAction
+
 
 @dataclass(frozen=True, kw_only=True)
 class AgentSettings:
@@ -19,3 +21,5 @@ class AgentSettings:
     """default, paper (the laws as printed), a .toml file of constants, package.module:Class or file.py:Class."""
     cap: float | None = None
     """A speed in km/h that no limit exceeds; the paper's comparison drives with 20."""
+    blind: UseAppendAction[tuple[str, ...]] = ()
+    """An affordance that the driver does not see, such as hazard_stop: it stays at its default. May be given again."""

@@ -41,6 +41,7 @@ class RunDescription(TypedDict):
     controller: str
     controller_source: NotRequired[str | None]
     cap: float | None
+    blind: NotRequired[list[str] | None]
     time_limit: str
     seed: int
     code: str
@@ -83,6 +84,7 @@ def run_identity(settings: BenchmarkSettings, trials: Sequence[Trial], driven_by
         "suite": str(own_suite.resolve()) if own_suite else settings.suite,
         "suite_content": suite_digest(own_suite, trials) if own_suite else None,
         "agent": driver.agent, "controller": driver.controller, "cap": driver.cap,
+        "blind": list(driver.blind) or None,
         "time_limit": settings.time_limit, "seed": settings.seed, **driven_by,
     }  # fmt: skip
 
@@ -120,7 +122,13 @@ class RunFolder:
         """Who drove."""
         about = self.description
         model = Path(about["model_file"]) if about["model_file"] else None
-        return AgentSettings(agent=about["agent"], model=model, controller=about["controller"], cap=about["cap"])
+        return AgentSettings(
+            agent=about["agent"],
+            model=model,
+            controller=about["controller"],
+            cap=about["cap"],
+            blind=tuple(about.get("blind") or ()),
+        )
 
     @cached_property
     def trials(self) -> list[Trial]:

@@ -14,8 +14,8 @@ class BenchmarkSettings(AgentSettings):
     """Drive a whole suite; what a folder holds already is kept, and the rest is driven."""
 
     suite: str = "quick"
-    """corl2017, corl2017-once (each of its routes in one weather only), nocrash, traffic-school, quick, or a .json
-    file with trials."""
+    """corl2017, corl2017-once (each of its routes in one weather only), dynamic (its fourth task only), nocrash,
+    traffic-school, quick, or a .json file with trials."""
     out: Path = Path("out/benchmark")
     """Folder for results.jsonl, a line an episode, and run.json, which says what drove."""
     known: tuple[Path, ...] = ()
@@ -41,4 +41,5 @@ class BenchmarkSettings(AgentSettings):
             model=self.model.resolve() if self.model else None,
             controller=full_name(self.controller),
             cap=None if self.signs else self.cap,
+            blind=self.blind,
         )

@@ -107,6 +107,11 @@ def _corl2017_once(seed: int, time_limit: str) -> list[Trial]:
     return sorted(filter(is_its_turn, _corl2017(seed, time_limit)), key=_route)
 
 
+def _dynamic(seed: int, time_limit: str) -> list[Trial]:
+    """Of the CoRL-2017 benchmark what has cars and people: 100 km in town 1, 60 km in town 2."""
+    return [trial for trial in _corl2017(seed, time_limit) if trial.scenario.task == TASKS[-1]]
+
+
 def _quick(seed: int, time_limit: str) -> list[Trial]:
     """Some of the CoRL-2017 benchmark, in a few minutes."""
     trials = _corl2017(seed, time_limit, QUICK_ROUTES)
@@ -150,6 +155,7 @@ def _nocrash_suite(fatal: tuple[InfractionKind, ...]) -> Callable[[int, str], li
 SUITES: Mapping[str, Callable[[int, str], list[Trial]]] = {  # by name; of a seed and a kind of time limit
     "corl2017": lambda seed, time_limit: list(_corl2017(seed, time_limit)),
     "corl2017-once": _corl2017_once,
+    "dynamic": _dynamic,
     "nocrash": _nocrash_suite(COLLISIONS),
     "traffic-school": _nocrash_suite(TRAFFIC_RULES),
     "quick": _quick,

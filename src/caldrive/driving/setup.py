@@ -5,6 +5,7 @@ from __future__ import annotations
 from numbers import Real
 from typing import Any
 
+from caldrive.agents.blind import blinded
 from caldrive.agents.registry import agent_entry
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import CameraConfig
@@ -60,7 +61,8 @@ def set_up(settings: AgentSettings, world_name: str = "embedded", images: bool =
     camera = entry.camera(settings) or (CameraConfig() if images else None)
     world = make_world(world_name, camera)
     try:
-        return world, entry.make(settings, world.dt, (lambda: truth_of(world)) if entry.privileged else None)
+        agent = entry.make(settings, world.dt, (lambda: truth_of(world)) if entry.privileged else None)
+        return world, blinded(agent, settings.blind)
     except BaseException:
         world.close()
         raise

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from caldrive.affordances import CONTINUOUS, DISCRETE
+from caldrive.affordances import BY_NAME, CONTINUOUS, DISCRETE
 from caldrive.benchmark.artifacts import read_trace
 from caldrive.benchmark.failure_causes import FailureCause, failure_cause
 from caldrive.benchmark.metrics import Cell, cells, is_clean
@@ -67,6 +67,7 @@ class BenchmarkRun:
         words += ["--signs"] if about["cap"] is None else ["--cap", f"{about['cap']:g}"]
         for option, name in OPTIONS.items():
             words += [option, str(about[name])] if about[name] != getattr(usual, name) else []
+        words += [word for name in about.get("blind") or () for word in ("--blind", name)]
         words += ["--model", about["model_file"]] if about.get("model_file") else []
         return shlex.join([*words, "--out", "DIR"])
 
@@ -111,10 +112,16 @@ def load_run(path: Path) -> BenchmarkRun:
     if len(whole) < len(results):
         lacking = next(result.trial.key for result in results if not _is_whole(result))
         problems.append(f"lines that lack figures and are left out: {len(results) - len(whole)}, such as {lacking}")
-    name = short_name(folder.description["agent"])
+    name = " ".join([short_name(folder.description["agent"]), *_blindness(folder.description)])
     return BenchmarkRun(
         name=name, folder=path, description=folder.description, results=whole, problems=tuple(problems)
     )  # fmt: skip
+
+
+def _blindness(description: dict[str, Any]) -> list[str]:
+    """What a driver did not see, in words."""
+    blind = [BY_NAME[name].title if name in BY_NAME else name for name in description.get("blind") or ()]
+    return ["blind to", " and ".join(blind)] if blind else []
 
 
 def _is_whole(result: TrialResult) -> bool:
