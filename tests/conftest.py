@@ -15,7 +15,7 @@ from caldrive.world.rendering.camera import CameraRig
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.town import load_town
-from caldrive.world.traffic.vehicles import stop_sumo
+from caldrive.world.traffic.sumo_process import stop_sumo
 from tests.perception.data import HEIGHT, WIDTH, record
 
 

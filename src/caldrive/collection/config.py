@@ -23,8 +23,9 @@ class CollectConfig:
     """Other cars in half of the episodes. Tailgating episodes have twice as many, the rest a third."""
     people: int = 70
     """Pedestrians."""
-    crossing: float = 5.0
-    """How many times as often as usual pedestrians cross the road."""
+    crossing: float = 0.8
+    """How many times as often as usual pedestrians cross the road: while a network is tested they do so more often
+    (section 4)."""
     before_signs: float = 0.35
     """Share of the episodes that begin shortly before a speed sign (not the tailgating ones)."""
     before_turns: float = 0.5

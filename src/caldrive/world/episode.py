@@ -8,19 +8,24 @@ from dataclasses import replace
 import numpy as np
 
 from caldrive.datatypes import DT, Contact, Control, PedestrianState, VehicleState
-from caldrive.geometry import moved
+from caldrive.geometry import moved, positions
 from caldrive.scenarios import Scenario
 from caldrive.timing import Timed, untimed
 from caldrive.world.roads.route import Route
 from caldrive.world.town import Town
 from caldrive.world.traffic.collisions import half_diagonal, obstacle_of, resolve
 from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
+from caldrive.world.traffic.parked_cars import ParkedCars
 from caldrive.world.traffic.pedestrians import Pedestrians
+from caldrive.world.traffic.sumo_process import MODELS
 from caldrive.world.traffic.traffic_lights import TrafficLights
 from caldrive.world.traffic.vehicles import Traffic
 from caldrive.world.truth.label_rig import LabelRig, WorldState
 
 ACTOR_REACH = 3.0  # m from the centre of a car or person to its farthest corner, at most
+UNSEEN_DEMAND = 1 / 45  # 1/s: how often somebody comes to a light where no cars drive
+PARKED_SHARE = 0.6  # parked cars for each that drives
+SCREENS = ("tree", "hedge", "billboard")  # what somebody may come from behind of
 PUSHED = 2.0  # m that a first contact may move the ego towards another, at most
 
 
@@ -35,10 +40,15 @@ class Episode:
         self, town: Town, scenario: Scenario, route: Route, vehicle: VehicleConfig, timed: Timed = untimed
     ) -> None:
         self.town, self.scenario, self.route, self.vehicle, self._timed = town, scenario, route, vehicle, timed
-        lights, people, cars = (np.random.default_rng([scenario.seed, i]) for i in range(3))
+        lights, people, cars, parked = (np.random.default_rng([scenario.seed, i]) for i in range(4))
         self._ego = EgoState(route.line.pose_at(0.0))
-        self._lights = TrafficLights(town.roads, lights)
-        self._pedestrians = Pedestrians(town.roads, scenario.n_pedestrians, people, scenario.crossing)
+        self._lights = TrafficLights(town.roads, lights, demand=0.0 if scenario.n_vehicles else UNSEEN_DEMAND)
+        self._parked = ParkedCars(
+            town.roads, round(PARKED_SHARE * scenario.n_vehicles), parked, ego=self._ego_box(),
+            near=town.obstacles.near, models=MODELS,
+        )  # fmt: skip
+        screens = positions([*self._parked.states(), *(prop for prop in town.scenery if prop.kind in SCREENS)])
+        self._pedestrians = Pedestrians(town.roads, scenario.n_pedestrians, people, scenario.crossing, screens)
         self.labels = LabelRig(town, route, scenario, vehicle.front_axle, self._lights.states())
         self._traffic: Traffic | None = None
         if scenario.n_vehicles:
@@ -65,6 +75,8 @@ class Episode:
             self._lights.step(time, (ego, *before.vehicles))
         if self._traffic is not None:
             with self._timed("traffic (SUMO)"):
+                for car in self._parked.step(DT, ego, before.vehicles):
+                    self._traffic.take_over(car.state, car.lane, car.s + car.way)
                 self._traffic.step(time, ego, before.pedestrians)
         with self._timed("pedestrians"):
             self._pedestrians.step(DT, [ego, *before.vehicles])
@@ -116,7 +128,7 @@ class Episode:
             people = self._pedestrians.states()
         with self._timed("lights"):
             lights = self._lights.states()
-        vehicles = self._traffic.cars if self._traffic is not None else ()
+        vehicles = (*self._traffic.cars, *self._parked.states()) if self._traffic is not None else ()
         self.state = WorldState(
             time=time,
             ego=self._ego_box(),

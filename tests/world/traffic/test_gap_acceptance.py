@@ -9,12 +9,12 @@ import pytest
 
 from caldrive.datatypes import Pose, VehicleState
 from caldrive.geometry import boxes_of
-from caldrive.world.traffic.gap_acceptance import may_walk
+from caldrive.world.traffic.gap_acceptance import bumps, may_walk
 
 
-def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float = 1.2) -> bool:
+def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float = 1.2, bold: bool = False) -> bool:
     """Whether somebody at (x, y) may walk (dx, dy)."""
-    return bool(may_walk(np.array((x, y)), (dx, dy), pace, boxes_of([car])))
+    return bool(may_walk(np.array((x, y)), (dx, dy), pace, boxes_of([car]), bold))
 
 
 def car(speed: float, heading: float = 0.0) -> VehicleState:
@@ -75,3 +75,35 @@ def test_the_look_before_a_step_does_not_depend_on_the_compass(heading: float) -
 
 def test_whoever_stands_at_the_end_of_his_way_already_walks_on() -> None:
     assert may(car(10.0), 12.0, 0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("kmh", [10, 15, 20, 25, 30])
+def test_the_bold_step_out_before_the_ego_as_soon_as_one_who_brakes_at_once_can_stop(kmh: int) -> None:
+    speed = kmh / 3.6
+    free = [x for x in np.arange(0.0, 20.0, 0.1) if may(car(speed), 2.1 + x, -2.06, 0.0, 0.2, bold=True)]
+    assert min(free) > speed**2 / (2 * 7.5) + 0.2 * speed
+    assert min(free) < speed**2 / (2 * 6.5) + 0.3 * speed + 1.0
+
+
+def test_the_bold_are_careful_with_others() -> None:
+    boxes = boxes_of([VehicleState(Pose(-1e4, 0, 0)), car(5.5)])
+    place = np.array((2.1 + 6.0, -2.06))
+    assert not may_walk(place, (0.0, 0.2), 1.2, boxes, True)
+    assert may_walk(place, (0.0, 0.2), 1.2, boxes_of([car(5.5)]), True)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "dx", "dy"), [(0.0, -1.4, 0.0, 0.14), (2.6, 0.0, -0.14, 0.0), (0.0, -1.3, 0.0, 0.14)]
+)
+def test_nobody_walks_into_a_standing_car(x: float, y: float, dx: float, dy: float) -> None:
+    boxes = boxes_of([car(0.0)])
+    assert bumps(np.array((x, y)), (dx, dy), boxes)
+    assert not bumps(np.array((x, y)), (-dx, -dy), boxes)
+
+
+def test_nobody_steps_before_a_car_that_cannot_stop_any_more_and_who_is_there_goes_on() -> None:
+    boxes = boxes_of([car(5.5)])
+    near, far, there = np.array((2.1 + 2.0, -1.4)), np.array((2.1 + 6.0, -1.4)), np.array((2.1 + 2.0, 0.5))
+    assert bumps(near, (0.0, 0.14), boxes)
+    assert not bumps(far, (0.0, 0.14), boxes)
+    assert not bumps(there, (0.0, 0.14), boxes)

@@ -14,9 +14,10 @@ from caldrive.datatypes import VehicleState
 from caldrive.scenarios import Scenario
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.traffic import vehicles
+from caldrive.world.traffic import sumo_process
+from caldrive.world.traffic.sumo_process import stop_sumo
 from caldrive.world.traffic.traffic_lights import TrafficLights
-from caldrive.world.traffic.vehicles import EGO, Traffic, stop_sumo
+from caldrive.world.traffic.vehicles import EGO, Traffic
 from caldrive.world.truth.label_rig import LabelRig
 
 
@@ -46,7 +47,7 @@ def test_a_kind_of_car_that_sumo_does_not_know_is_refused(
     town02: RoadNetwork, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "none.add.xml").write_text("<additional/>")
-    monkeypatch.setattr(vehicles, "DRIVERS", tmp_path / "none.add.xml")
+    monkeypatch.setattr(sumo_process, "DRIVERS", tmp_path / "none.add.xml")
     with pytest.raises(RuntimeError, match=r"found that SUMO cannot let cars drive in town02 .*driver"):
         start(town02)
     assert not libsumo.isLoaded()

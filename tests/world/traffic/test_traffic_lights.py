@@ -175,3 +175,28 @@ def test_a_town_without_lights_has_nothing_to_show() -> None:
     lights = TrafficLights(SimpleNamespace(posts=()), np.random.default_rng(0))  # type: ignore[arg-type]
     lights.step(0.1, [])
     assert lights.states() == ()
+
+
+def test_where_no_cars_drive_lights_turn_for_those_whom_nobody_sees(town01: RoadNetwork) -> None:
+    def changes(demand: float) -> int:
+        """Phases that end in five minutes."""
+        lights, seen = TrafficLights(town01, np.random.default_rng(0), demand), list[object]()
+        for k in range(3000):
+            lights.step(0.1 * k, [])
+            seen.append(tuple(junction.phase for junction in lights.junctions.values()))
+        return sum(before != after for before, after in pairwise(seen))
+
+    assert changes(0.0) == 0
+    assert changes(1 / 45) > 10 * len(TrafficLights(town01, np.random.default_rng(0)).junctions)
+
+
+def test_with_unseen_demand_no_light_stays_red_for_long(town01: RoadNetwork) -> None:
+    lights, reds = TrafficLights(town01, np.random.default_rng(1), demand=1 / 45), list[int]()
+    since = np.zeros(len(lights.states()), dtype=int)
+    for k in range(6000):
+        lights.step(0.1 * k, [])
+        is_red = np.array([light.state is RED for light in lights.states()])
+        reds += since[~is_red & (since > 0)].tolist()
+        since = np.where(is_red, since + 1, 0)
+    assert len(reds) > 100
+    assert np.median(reds) * 0.1 < 90.0

@@ -15,8 +15,9 @@ from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, 
 from caldrive.geometry import box_corners, boxes_overlap, moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.traffic.start_places import room
+from caldrive.world.traffic.sumo_process import stop_sumo
 from caldrive.world.traffic.traffic_lights import TrafficLights
-from caldrive.world.traffic.vehicles import Traffic, in_sight, stop_sumo
+from caldrive.world.traffic.vehicles import Traffic, in_sight
 
 DT = 0.1
 Cars = tuple[VehicleState, ...]

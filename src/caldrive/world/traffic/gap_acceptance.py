@@ -1,5 +1,7 @@
-"""When people step in front of cars: they accept a gap in which a driver who keeps to the limit can still stop for
-them, or has passed, or is slow; in front of a fast car they wait."""
+"""When people step in front of cars. The careful accept a gap in which a driver who keeps to the limit can still stop
+for them, or has passed, or is slow; in front of a fast car they wait. The bold misjudge the ego: they step out in front
+of it as soon as a driver who brakes at once can just stop. So who looks can always avoid them, and who does not cannot.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +21,19 @@ MOVING = 0.3  # m/s from which on a car moves
 STANDING_GAP = 0.8  # m ahead of a standing car within which nobody walks
 STANDS_STILL = 1e-6  # m across a corridor: who goes no farther enters none
 PASSED = 1.0  # m behind a car's rear from which on it has passed
+# Of a driver who brakes at once: s until the brake works, m/s², and m that remain between him and somebody.
+REACTION, HARD_BRAKE, SPARE = 0.3, 6.5, 0.8
+EGO = 0  # its row among the boxes
+BODY, TOUCH = 1.35, 0.45  # m: half of a car and of a person beside it, and from its ends, with some room
+FULL_BRAKE, LEFT_OVER = 7.0, 0.3  # m/s² of a driver who brakes already, and m that remain
 Floats = NDArray[np.float64]
 
 
 @compiled
-def may_walk(position: Points, way: tuple[float, float], pace: float, boxes: Floats) -> bool:
+def may_walk(position: Points, way: tuple[float, float], pace: float, boxes: Floats, is_bold: bool) -> bool:
     """Whether somebody (2,) may walk a stretch (x, y in m) at a pace (m/s): who enters no corridor of a car that by
-    then is beside them or can neither stop nor pass. boxes: see `geometry.boxes_of`."""
+    then is beside them or can neither stop nor pass. boxes: of the ego and the others, see `geometry.boxes_of`;
+    is_bold: in front of the ego."""
     for car in range(len(boxes)):
         heading, speed, half = boxes[car, 2], boxes[car, 3], boxes[car, 4]
         dx, dy, u, v = position[0] - boxes[car, 0], position[1] - boxes[car, 1], math.cos(heading), math.sin(heading)
@@ -37,9 +45,33 @@ def may_walk(position: Points, way: tuple[float, float], pace: float, boxes: Flo
         if 0 < share <= 1:
             arrives = share * math.hypot(way[0], way[1]) / pace
             then = ahead + share * (way[0] * u + way[1] * v) - speed * arrives
-            if then > -2 * half - PASSED and _cannot_stop(then, arrives, speed, 2 * CORRIDOR / pace):
+            if then <= -2 * half - PASSED:
+                continue
+            if is_bold and car == EGO:
+                if _cannot_stop_at_once(then, speed, 2 * CORRIDOR / pace):
+                    return False
+            elif _cannot_stop(then, arrives, speed, 2 * CORRIDOR / pace):
                 return False
     return True
+
+
+@compiled
+def bumps(position: Points, step: tuple[float, float], boxes: Floats) -> bool:
+    """Whether a step (x, y in m) leads somebody (2,) into a car, or in front of one that would reach them even if it
+    braked fully: a car that turns may come to be before people who have entered no corridor, and beside them."""
+    for car in range(len(boxes)):
+        heading, speed, half = boxes[car, 2], boxes[car, 3], boxes[car, 4]
+        dx, dy, u, v = position[0] - boxes[car, 0], position[1] - boxes[car, 1], math.cos(heading), math.sin(heading)
+        ahead, left = dx * u + dy * v - half, dy * u - dx * v
+        then_ahead, then_left = ahead + step[0] * u + step[1] * v, left + step[1] * u - step[0] * v
+        reach = TOUCH
+        if speed > MOVING:
+            reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
+        is_near = -2 * half - TOUCH < ahead < reach and abs(left) < BODY
+        will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < BODY
+        if will_be and (not is_near or (ahead < TOUCH and abs(then_left) < abs(left))):
+            return True
+    return False
 
 
 @inlined
@@ -50,9 +82,20 @@ def _cannot_stop(then: float, arrives: float, speed: float, taken: float) -> boo
     gained = (MAY_GAIN if is_moving else 0.0) * arrives  # they reckon with a car that speeds up
     nearest, fastest = then - gained * arrives / 2, speed + gained
     room = fastest * 4.5 if fastest > STOPPABLE_SPEED else 3.5 + fastest * 0.5 + fastest * fastest / 10
-    # Until it sees them a car may speed up further: is it too fast by then, and there before they have left?
-    unseen = max(nearest - SEEN_FROM, 0.0)
-    too_fast = fastest * fastest + 2 * MAY_GAIN * unseen > STOPPABLE_SPEED * STOPPABLE_SPEED
-    surprised = is_moving and too_fast and unseen < fastest * taken + MAY_GAIN * taken * taken / 2
     too_near = nearest < (room if is_moving else STANDING_GAP)
-    return bool(too_near or surprised)
+    return bool(too_near or _is_surprised(nearest, fastest, taken))
+
+
+@inlined
+def _cannot_stop_at_once(ahead: float, speed: float, taken: float) -> bool:
+    """Likewise a car whose driver brakes as soon as they enter its corridor, so many m ahead of its front."""
+    room = REACTION * speed + speed * speed / (2 * HARD_BRAKE) + SPARE
+    return bool(ahead < (room if speed > MOVING else STANDING_GAP) or _is_surprised(ahead, speed, taken))
+
+
+@inlined
+def _is_surprised(ahead: float, speed: float, taken: float) -> bool:
+    """Whether a car that speeds up until it sees them is too fast by then, and there before they have left."""
+    unseen = max(ahead - SEEN_FROM, 0.0)
+    too_fast = speed * speed + 2 * MAY_GAIN * unseen > STOPPABLE_SPEED * STOPPABLE_SPEED
+    return speed > MOVING and too_fast and unseen < speed * taken + MAY_GAIN * taken * taken / 2

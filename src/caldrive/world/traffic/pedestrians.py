@@ -1,7 +1,8 @@
 """People who walk along the sidewalks and cross the road anywhere.
 
 Everybody walks on closed loops in the middle of the sidewalks. Now and then somebody crosses to the loop on the other
-side, when the gap between the cars allows it.
+side: the careful when the gap between the cars allows it, the bold in front of the ego, walking or running, and some of
+them from behind a tree or a car that is parked.
 """
 
 from __future__ import annotations
@@ -12,15 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from caldrive.compiled import compiled, inlined
 from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
 from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.traffic.gap_acceptance import may_walk
+from caldrive.world.traffic.gap_acceptance import bumps, may_walk
 from caldrive.world.traffic.sidewalks import Crossing, Floats, Loops, find_sidewalks, require_room
 
-MEAN_WALK_BETWEEN_CROSSINGS = 60.0  # s
+MEAN_WALK_BETWEEN_CROSSINGS = 20.0  # s
+# Shares: of those who cross; of the bold, who run, and who come from behind something.
+BOLD, RUNNING, HIDDEN = 0.6, 0.3, 0.4
+SLOWEST_RUN, FASTEST_RUN = 2.2, 3.2  # m/s
+SCREEN = 2.5  # m around a place ahead of the kerb within which a tree or car hides who comes from there
 SLOWEST, FASTEST = 0.9, 1.6  # m/s
 WIDEST_OFFSET = 0.7  # m from the middle of the sidewalk that somebody walks beside it
 CROSSING_REACH = 1.5  # m along the loop within which a crossing is taken
@@ -28,6 +34,7 @@ PATIENCE = 5.0  # s of waiting at the kerb before walking on, or on the road bef
 KERB = 1.2  # m from the middle of the sidewalk
 NO_WAY = 1e-9  # m: as good as there
 Flags = NDArray[np.bool_]
+NO_SCREENS = np.zeros((0, 2))
 
 
 class Walkers(NamedTuple):
@@ -53,6 +60,10 @@ class Walkers(NamedTuple):
     """(N,)."""
     waited: Floats
     """(N,) in s."""
+    bold: Flags
+    """(N,): who cross in front of the ego."""
+    crossing_pace: Floats
+    """(N,) in m/s: with which they cross."""
     start: Points
     """(N, 2): of those who cross, where from."""
     end: Points
@@ -60,12 +71,20 @@ class Walkers(NamedTuple):
 
 
 class Pedestrians:
-    """n people, all random choices from one generator. crossing: how many times as often as usual they cross.
+    """n people, all random choices from one generator. crossing: how many times as often as usual they cross; screens:
+    what may hide somebody (M, 2), m.
 
     Raises ValueError for more people than the sidewalks hold.
     """
 
-    def __init__(self, roads: RoadNetwork, n: int, rng: np.random.Generator, crossing: float = 1.0) -> None:
+    def __init__(
+        self,
+        roads: RoadNetwork,
+        n: int,
+        rng: np.random.Generator,
+        crossing: float = 1.0,
+        screens: Points = NO_SCREENS,
+    ) -> None:
         require_room(roads, n)
         self.sidewalks, self.rng, self.rate = find_sidewalks(roads), rng, crossing / MEAN_WALK_BETWEEN_CROSSINGS
         lengths = self.sidewalks.loops.lengths
@@ -78,9 +97,12 @@ class Pedestrians:
             pace=rng.uniform(SLOWEST, FASTEST, size=n),
             offset=rng.uniform(-WIDEST_OFFSET, WIDEST_OFFSET, size=n),
             position=np.zeros((n, 2)), heading=np.zeros(n), walking=np.ones(n, dtype=bool),
-            on_road=np.zeros(n, dtype=bool), waited=np.zeros(n), start=np.zeros((n, 2)), end=np.zeros((n, 2)),
+            on_road=np.zeros(n, dtype=bool), waited=np.zeros(n), bold=np.zeros(n, dtype=bool),
+            crossing_pace=np.zeros(n), start=np.zeros((n, 2)), end=np.zeros((n, 2)),
         )  # fmt: skip
         self.crossing: list[Crossing | None] = [None] * n
+        self._screened = [_screened(ways, screens) for ways in self.sidewalks.crossings] if n else []
+        self._hiding: set[int] = set()  # those who look for something to come from behind
         walk_on(self.walkers, self.sidewalks.loops, np.arange(n), dt=0.0)
 
     def step(self, dt: float, cars: Sequence[VehicleState]) -> None:
@@ -95,12 +117,29 @@ class Pedestrians:
                 self._end_crossing(k, is_there, at_kerb)
         walk_on(self.walkers, self.sidewalks.loops, np.flatnonzero(~crossing), dt)
         for k in np.flatnonzero(starts & ~crossing).tolist():
-            self._start_crossing(k)
+            self._decide(k)
+        for k in sorted(self._hiding):
+            self._look_for_a_way(k, self._screened)
 
-    def _start_crossing(self, k: int) -> None:
-        options, s = self.sidewalks.crossings[self.walkers.loop[k]], self.walkers.s[k]
-        near = next((way for way in options if abs(way.s - s) < CROSSING_REACH), None)
+    def _decide(self, k: int) -> None:
+        """Somebody wants to cross from now on, in a way that is drawn."""
+        walkers = self.walkers
+        bold, running, hidden = self.rng.random(3) < (BOLD, RUNNING, HIDDEN)
+        run = self.rng.uniform(SLOWEST_RUN, FASTEST_RUN)
+        walkers.bold[k] = bold
+        walkers.crossing_pace[k] = run if bold and running else walkers.pace[k]
+        if bold and hidden:
+            self._hiding.add(k)
+        else:
+            self._hiding.discard(k)
+            self._look_for_a_way(k, self.sidewalks.crossings)
+
+    def _look_for_a_way(self, k: int, ways: Sequence[Sequence[Crossing]]) -> None:
+        """Somebody crosses if one of these ways begins here."""
+        s = self.walkers.s[k]
+        near = next((way for way in ways[self.walkers.loop[k]] if abs(way.s - s) < CROSSING_REACH), None)
         if near is not None:
+            self._hiding.discard(k)
             self._take(k, near)
 
     def _take(self, k: int, way: Crossing | None) -> None:
@@ -124,12 +163,24 @@ class Pedestrians:
     def states(self) -> tuple[PedestrianState, ...]:
         """Everybody as of now."""
         walkers = self.walkers
-        speeds = np.where(walkers.walking, walkers.pace, 0.0).tolist()
+        crossing = np.array([way is not None for way in self.crossing], dtype=bool)
+        pace = np.where(crossing, walkers.crossing_pace, walkers.pace)
+        speeds = np.where(walkers.walking, pace, 0.0).tolist()
         numbers = walkers.position.tolist(), walkers.heading.tolist(), speeds, walkers.on_road.tolist(), self.names
         return tuple(
             PedestrianState(Pose(x, y, heading), speed, on_road=on_road, id=name)
             for (x, y), heading, speed, on_road, name in zip(*numbers, strict=True)
         )
+
+
+def _screened(ways: Sequence[Crossing], screens: Points) -> list[Crossing]:
+    """Those that begin behind something."""
+    if not ways or not len(screens):
+        return []
+    starts, ends = (np.array([getattr(way, name) for way in ways]) for name in ("start", "end"))
+    ahead = starts + (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
+    near = KDTree(screens).query(ahead)[0] < SCREEN
+    return [way for way, hides in zip(ways, near, strict=True) if hides]
 
 
 @compiled
@@ -153,15 +204,17 @@ def cross_on(
     (who),). boxes: see `geometry.boxes_of`."""
     for i in range(len(who)):
         k = who[i]
-        position, pace = walkers.position[k], walkers.pace[k]
+        position, pace, is_bold = walkers.position[k], walkers.crossing_pace[k], walkers.bold[k]
         rest, step = _away(position, walkers.end[k]), pace * dt
         ahead_x = (walkers.end[k, 0] - position[0]) / max(rest, NO_WAY)
         ahead_y = (walkers.end[k, 1] - position[1]) / max(rest, NO_WAY)
         at_kerb[i] = _away(position, walkers.start[k]) < KERB
-        look = rest if at_kerb[i] else step  # at the kerb they look over the whole road, on it only at the next step
+        # At the kerb the careful look over the whole road, on it only at the next step.
+        look = rest if at_kerb[i] and not is_bold else step
         arrived[i] = rest <= step
         walkers.heading[k] = math.atan2(ahead_y, ahead_x)
-        walkers.walking[k] = may_walk(position, (ahead_x * look, ahead_y * look), pace, boxes)
+        walkers.walking[k] = may_walk(position, (ahead_x * look, ahead_y * look), pace, boxes, is_bold)
+        walkers.walking[k] &= not bumps(position, (ahead_x * step, ahead_y * step), boxes)
         if walkers.walking[k]:
             position[0] += min(step, rest) * ahead_x
             position[1] += min(step, rest) * ahead_y

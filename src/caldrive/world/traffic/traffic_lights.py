@@ -124,9 +124,13 @@ def _look_inside(boxes: Points, centers: Points, radii: Points, occupied: NDArra
 
 
 class TrafficLights:
-    """All traffic lights of a town; who has the first green is drawn from rng. junctions: by the light's id."""
+    """All traffic lights of a town; who has the first green is drawn from rng. junctions: by the light's id.
 
-    def __init__(self, roads: RoadNetwork, rng: np.random.Generator) -> None:
+    demand: how often (1/s) somebody comes to each approach whom nobody sees, as where no cars drive the lights would
+    wait for the ego alone, and never turn yellow before it.
+    """
+
+    def __init__(self, roads: RoadNetwork, rng: np.random.Generator, demand: float = 0.0) -> None:
         grouped: dict[str, list[LightPost]] = defaultdict(list)
         for post in roads.posts:
             grouped[post.light].append(post)
@@ -134,12 +138,19 @@ class TrafficLights:
             name: JunctionLights(tuple(posts), _first_phase(len(posts), rng)) for name, posts in sorted(grouped.items())
         }
         self._detectors = _LoopDetectors(self.junctions.values()) if self.junctions else None
+        self.rng, self.demand, self._time = rng, demand, 0.0
+        self._unseen = np.zeros(sum(len(junction.posts) for junction in self.junctions.values()), dtype=bool)
 
     def step(self, time: float, cars: Iterable[VehicleState]) -> None:
         """Moves all junctions on to a time (s), given everybody who drives."""
         if self._detectors is None:
             return
         waiting, occupied = self._detectors.look(boxes_of(cars))
+        if self.demand:
+            self._unseen |= self.rng.random(len(self._unseen)) < self.demand * (time - self._time)
+            self._unseen &= ~np.array([state is LightState.GREEN for state in self._shown()], dtype=bool)
+            waiting |= self._unseen
+        self._time = time
         first, waits = 0, waiting.tolist()
         for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
             last = first + len(junction.posts)
@@ -147,6 +158,10 @@ class TrafficLights:
             if phase is not junction.phase:
                 junction.change(phase)
             first = last
+
+    def _shown(self) -> list[LightState]:
+        """What each post shows."""
+        return [light.state for light in self.states()]
 
     def states(self) -> tuple[TrafficLight, ...]:
         """Every light with what it shows now."""

@@ -5,12 +5,8 @@ SUMO's conventions end here: its positions are those of front bumpers, its angle
 
 from __future__ import annotations
 
-import gc
 import math
-import weakref
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 import libsumo
@@ -19,35 +15,27 @@ import numpy as np
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.geometry import moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
+from caldrive.world.traffic.incidents import Incident, Incidents
 from caldrive.world.traffic.start_places import free_places
 from caldrive.world.traffic.sumo_inputs import SumoLights, speed_caps
+from caldrive.world.traffic.sumo_process import (
+    MODELS,
+    has_sumo,
+    load_sumo,
+    one_sentence,
+    release_sumo,
+    stop_sumo,
+    take_sumo,
+)
 from caldrive.world.traffic.traffic_lights import TrafficLights
 
 EGO = "ego"
 POSITION, ANGLE, SPEED = 0x42, 0x43, 0x40  # numbers that libsumo has for what it can be asked
-DRIVERS = Path(__file__).with_name("drivers.add.xml")
 LONGEST_WAIT = 60.0  # s until a car that is stuck is moved elsewhere
 OUT_OF_SIGHT, BESIDE = 70.0, 25.0  # m from the ego, where its camera looks and elsewhere
 LONGEST_WAY, LAST_EDGES = 30, 6  # edges of a random way, and how many of it are left when it gets a new one
 OFF_ROAD = 15.0  # m from every lane, where no car minds the ego any more: SUMO looks for its lane no farther away
 CHECK_EVERY = 20  # steps, from one look after cars that are stuck or near the end of their way to the next
-MODELS = (("compact", 4.2, 1.76), ("estate", 4.6, 1.8), ("van", 4.9, 1.95))  # name, length, width in m
-
-
-_driving: weakref.ref[Traffic] | None = None  # the traffic that libsumo simulates; it can hold one in a process
-
-
-def _take_sumo(traffic: Traffic) -> None:
-    """Notes whose SUMO it is from now on. Raises RuntimeError where it is another's."""
-    global _driving
-    if _driving is not None and _driving() is not None:
-        gc.collect()  # a world that nobody holds any more may still lie around
-    if _driving is not None and _driving() is not None:
-        raise RuntimeError(
-            "found another world with traffic in this process, wanted none, as SUMO simulates one at a time: "
-            "close() that world first, or give each world a process of its own"
-        )
-    _driving = weakref.ref(traffic)
 
 
 class Traffic:
@@ -65,9 +53,11 @@ class Traffic:
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
         starts = self._random_places(n, ego)
         self._capped: set[str] = set()  # cars that are told how fast they may drive
-        _take_sumo(self)
+        self._incidents = Incidents(self.rng)
+        self._braking: str | None = None  # who brakes harder than others may
+        take_sumo(self)
         try:
-            with _one_sentence(roads.name):
+            with one_sentence(roads.name):
                 self._start(seed, ego, starts, lights)
         except BaseException:
             self.close()  # nobody else can: there is no traffic yet
@@ -75,7 +65,7 @@ class Traffic:
 
     def _start(self, seed: int, ego: VehicleState, starts: Sequence[tuple[Lane, float]], lights: TrafficLights) -> None:
         """Begins the simulation, with each car at its place."""
-        _load(self.roads, self.dt, seed)
+        load_sumo(self.roads, self.dt, seed)
         self._add_ego(ego)
         for name, (lane, s) in zip(self.size, starts, strict=True):
             self._add(name, lane, s)
@@ -85,13 +75,11 @@ class Traffic:
 
     def release(self) -> None:
         """Lets another traffic have SUMO; this one cannot be moved any more."""
-        global _driving
-        if _driving is not None and _driving() is self:
-            _driving = None
+        release_sumo(self)
 
     def close(self) -> None:
         """Ends the simulation, unless another traffic has SUMO by now."""
-        if _driving is not None and _driving() is self:
+        if has_sumo(self):
             stop_sumo()
 
     def _random_places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
@@ -115,6 +103,15 @@ class Traffic:
         model, index = self.size[name][0], lane.id.rsplit("_", 1)[1]
         libsumo.vehicle.add(name, route, typeID=model, departPos=f"{s:.2f}", departLane=index, departSpeed="0")
 
+    def take_over(self, car: VehicleState, lane: Lane, s: float) -> None:
+        """A car that drives in a lane, s m along it, is one of these from now on."""
+        model = next(name for name, length, width in MODELS if (length, width) == (car.length, car.width))
+        self.size[car.id] = (model, car.length, car.width)
+        with one_sentence(self.roads.name):
+            self._add(car.id, lane, s)
+            libsumo.vehicle.moveTo(car.id, lane.id, min(s + car.length / 2, lane.line.length - 0.1))
+            libsumo.vehicle.setPreviousSpeed(car.id, car.speed)
+
     def _add_ego(self, ego: VehicleState) -> None:
         lane, s = self.roads.lane_at(ego.pose)
         libsumo.route.add("ego", [_edge(lane.id)])
@@ -124,12 +121,12 @@ class Traffic:
 
     def step(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
         """Moves the cars on by dt, under what the lights show now; time in s."""
-        if _driving is None or _driving() is not self:
+        if not has_sumo(self):
             raise RuntimeError(
                 "found an episode that has lost SUMO, which simulates one at a time, wanted a running one: "
                 "call reset(scenario)"
             )
-        with _one_sentence(self.roads.name):
+        with one_sentence(self.roads.name):
             self._move(time, ego, people)
 
     def _move(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
@@ -137,23 +134,37 @@ class Traffic:
         front = moved(ego.pose, forward=ego.length / 2)
         angle = 90.0 - math.degrees(ego.pose.heading)
         libsumo.vehicle.moveToXY(EGO, "", -1, front.x, front.y, angle, keepRoute=2, matchThreshold=OFF_ROAD)
-        self._cap_speeds(people)
+        self._cap_speeds(time, ego, people)
         libsumo.simulationStep()
         if round(time / self.dt) % CHECK_EVERY == 0:
             self._look_after(ego)
         self.cars = self._read()
 
-    def _cap_speeds(self, people: Sequence[PedestrianState]) -> None:
-        """Lets cars stop before people on the road, and those drive on that had to."""
-        if not people and not self._capped:
-            return
+    def _cap_speeds(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
+        """Lets cars stop before people on the road and where something happens to them, and those drive on that had
+        to."""
         caps = speed_caps(self.cars, people)
         present = {car.id for car in self.cars}
+        incident = self._incidents.step(time, self.dt, ego, self.cars)
+        if incident is not None and incident.name in present:
+            caps[incident.name] = min(incident.allowed(time), caps.get(incident.name, math.inf))
+        self._brake_hard(incident, present)
         for name in sorted((self._capped - caps.keys()) & present):
             libsumo.vehicle.setSpeed(name, -1.0)
         for name, speed in caps.items():
             libsumo.vehicle.setSpeed(name, speed)
         self._capped = set(caps)
+
+    def _brake_hard(self, incident: Incident | None, present: Set[str]) -> None:
+        """Lets the car that something happens to brake as hard as it has to, and only it."""
+        name = incident.name if incident is not None and incident.name in present else None
+        if name == self._braking:
+            return
+        if self._braking is not None and self._braking in present:
+            libsumo.vehicle.setDecel(self._braking, libsumo.vehicletype.getDecel(self.size[self._braking][0]))
+        if name is not None and incident is not None:
+            libsumo.vehicle.setDecel(name, max(incident.brake, libsumo.vehicle.getDecel(name)))
+        self._braking = name
 
     def _look_after(self, ego: VehicleState) -> None:
         """Gives cars near the end of their way a new one, and moves those that are stuck while nobody sees it."""
@@ -169,6 +180,7 @@ class Traffic:
                 libsumo.vehicle.setRoute(name, self._random_way(way[index]))
             stuck = libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT
             if stuck and not in_sight(ego, libsumo.vehicle.getPosition(name)):
+                libsumo.vehicle.unsubscribe(name)  # SUMO would miss it at its next step
                 libsumo.vehicle.remove(name)
 
     def _read(self) -> tuple[VehicleState, ...]:
@@ -189,35 +201,6 @@ class Traffic:
         return VehicleState(center, values[SPEED], length=length, width=width, id=name)
 
 
-@contextmanager
-def _one_sentence(town: str) -> Iterator[None]:
-    """Says what SUMO refuses. Raises RuntimeError."""
-    try:
-        yield
-    except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-        raise RuntimeError(
-            f"found that SUMO cannot let cars drive in {town} ({error}), wanted traffic: "
-            "give another map, or drive alone with --cars 0"
-        ) from error
-
-
-def _load(roads: RoadNetwork, dt: float, seed: int) -> None:
-    """Starts an empty simulation of a town, in the place of any other, with the kinds of cars that drive in it."""
-    arguments = [
-        "-n", str(roads.network), "--step-length", str(dt), "--seed", str(seed % 2**31), "--no-step-log",
-        "--no-warnings", "--time-to-teleport", "-1", "--collision.action", "none", "--start",
-        "--default.speeddev", "0.05", "--additional-files", str(DRIVERS),
-    ]  # fmt: skip
-    if libsumo.isLoaded():
-        libsumo.load(arguments)
-    else:
-        libsumo.start(["sumo", *arguments])
-    for name, length, width in MODELS:
-        libsumo.vehicletype.copy("driver", name)
-        libsumo.vehicletype.setLength(name, length)
-        libsumo.vehicletype.setWidth(name, width)
-
-
 def in_sight(ego: VehicleState, place: tuple[float, float]) -> bool:
     """Whether somebody at a place may be in the ego's pictures, or so close that others would notice."""
     ahead, left = to_local(ego.pose, np.array(place)).tolist()
@@ -228,11 +211,3 @@ def in_sight(ego: VehicleState, place: tuple[float, float]) -> bool:
 def _edge(lane: str) -> str:
     """The id of the edge that a lane is part of."""
     return lane.rsplit("_", 1)[0]
-
-
-def stop_sumo() -> None:
-    """Ends the simulation of this process, if there is one."""
-    global _driving
-    _driving = None
-    if libsumo.isLoaded():
-        libsumo.close()
