@@ -17,7 +17,7 @@ PROGRAM = """
 import numpy as np
 from caldrive.geometry import boxes_of
 from caldrive.world.traffic.gap_acceptance import may_walk
-print(may_walk(np.zeros(2), (0.0, 1.0), 1.0, boxes_of([])))
+print(may_walk(np.zeros(2), (0.0, 1.0), 1.0, boxes_of([]), False))
 """
 
 

@@ -90,7 +90,9 @@ def test_an_episode_begins_at_rest_at_its_start_at_time_0(world: EmbeddedWorld) 
 
 def test_the_scenario_decides_how_many_are_around(world: EmbeddedWorld) -> None:
     (truth,) = drive(world, along_the_street(n_vehicles=7, n_pedestrians=11), 0, NOTHING)
-    assert (len(truth.vehicles), len(truth.pedestrians), len(truth.lights)) == (7, 11, 24)
+    drivers = [car for car in truth.vehicles if not car.id.startswith("parked")]
+    assert (len(drivers), len(truth.pedestrians), len(truth.lights)) == (7, 11, 24)
+    assert len(truth.vehicles) - len(drivers) == round(0.6 * 7)
     assert not drive(world, along_the_street(), 0, NOTHING)[0].vehicles
 
 
