@@ -49,7 +49,7 @@ def draw_in_steps(rig: CameraRig, state: SceneState, laps: Laps) -> None:
     camera = camera_on(state.ego, CameraConfig())
     drawn = rig._drawn(camera, state)
     laps.note("what may be in view (Python)")
-    light, materials = rig._atmosphere.in_weather(state.weather)
+    light, materials = rig._atmosphere.in_weather(state.weather, state.ego.pose.x, state.ego.pose.y)
     scene, canvas = Scene(materials, light, camera.view()), rig._canvas(camera.size, SAMPLES)
     lamps, room, sheet = rig._lamps.lit(state.lights, float(light.wetness)), canvas._room_of(drawn), canvas.sheet
     laps.note("camera, light, room (Python)")

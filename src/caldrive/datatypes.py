@@ -80,10 +80,18 @@ class PedestrianState:
 
 @dataclass(frozen=True)
 class Sign:
-    """A speed sign: foot of its post, heading of the traffic that it faces, and the limit in km/h."""
+    """A speed sign: the place right beside its lane, with the heading of the traffic that it is for, and the limit in
+    km/h. foot: where its post stands, if it is not there. height: of the road, m."""
 
     pose: Pose
     limit: int
+    foot: Pose | None = None
+    height: float = 0.0
+
+    @property
+    def stands_at(self) -> Pose:
+        """Where the post is to be seen."""
+        return self.foot or self.pose
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,7 @@ class Polyline:
         if points.ndim != 2 or points.shape[1] != 2:
             raise ValueError(f"a polyline needs points of shape (N, 2), found {points.shape}")
         keep = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6))
+        self.kept: NDArray[np.bool_] = keep  # which of the points differ from the one before
         self.points: Points = points[keep]
         if len(self.points) < 2:
             raise ValueError(f"a polyline needs two different points, found {len(self.points)}")

@@ -48,6 +48,7 @@ def test_town_writes_the_plan_alone_where_only_that_is_asked_for(tmp_path: Path)
     answer = run_json("town", "--town", "town02", "--plan", str(tmp_path / "plan.png"), "--width", "1100")
     assert (answer["plan_width"], answer["plan_height"]) == size(answer["plan"])
     assert answer["plan_width"] == 1100
+    assert (answer["left_out"], answer["offset"]) == ([], [0.0, 0.0])
     assert "sheet" not in answer
     assert [path.name for path in tmp_path.iterdir()] == ["plan.png"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -128,10 +129,21 @@ def test_routes_drawn_anew_fit_their_task_and_follow_the_seed(task: str, town02:
     assert all(low <= count <= high for count in counts)
 
 
-def test_a_map_too_small_for_a_task_says_so(town02: RoadNetwork) -> None:
-    from dataclasses import replace
+def test_a_map_with_fewer_routes_gives_those_that_it_has(town02: RoadNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("caldrive.driving.tasks._TRIES", 8)
+    found = draw_routes(town02, "straight", 25, np.random.default_rng(0))
+    assert 0 < len(found) < 25
 
+
+def test_a_map_of_short_lanes_has_no_place_to_start(town02: RoadNetwork) -> None:
+    lane = min(town02.driveable, key=lambda lane: lane.line.length)
+    small = replace(town02, lanes={lane.id: replace(lane, successors=())})
+    with pytest.raises(ValueError, match=r"found no lane in town02 that is longer than 32 m, wanted one to start on"):
+        draw_routes(small, "straight", 1, np.random.default_rng(0))
+
+
+def test_a_map_too_small_for_a_task_says_so(town02: RoadNetwork) -> None:
     (lane,) = [lane for lane in town02.driveable if lane.line.length > 60][:1]
     small = replace(town02, lanes={lane.id: replace(lane, successors=())})
-    with pytest.raises(ValueError, match="found 0 routes for navigation in town02, wanted 3: give a larger map"):
+    with pytest.raises(ValueError, match="found no route for navigation in town02, wanted one: give a larger map"):
         draw_routes(small, "navigation", 3, np.random.default_rng(0))

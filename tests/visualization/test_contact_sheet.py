@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from caldrive.datatypes import Image
-from caldrive.visualization.contact_sheet import CAPTION, MARGIN, cars_and_people, contact_sheet, viewpoints
+from caldrive.visualization.contact_sheet import CAPTION, MARGIN, cars_and_people, contact_sheet, viewpoints, whole_town
 from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.towns import load_roads
 
 SIZE = (64, 32)
 
@@ -20,15 +21,18 @@ def images(sheet: Image, row: int) -> Image:
 
 def test_there_is_a_row_for_each_weather_and_a_column_for_each_viewpoint() -> None:
     sheet = contact_sheet("town02", SIZE, (1, 13))
-    assert sheet.shape == (MARGIN + 2 * (32 + CAPTION + MARGIN), MARGIN + 3 * (64 + MARGIN), 3)
+    width = MARGIN + 3 * (64 + MARGIN)
+    below = whole_town(load_roads("town02"), width)
+    assert sheet.shape == (MARGIN + 2 * (32 + CAPTION + MARGIN) + len(below), width, 3)
+    assert (sheet[-len(below) :] == below).all()
     assert np.abs(images(sheet, 0) - images(sheet, 1)).mean() > 5
 
 
 def test_there_is_a_row_for_each_random_look() -> None:
     sheet = contact_sheet("town01", SIZE, (1,), randomised=2)
-    assert sheet.shape[0] == MARGIN + 2 * (32 + CAPTION + MARGIN)
     usual = contact_sheet("town01", SIZE, (1,))
     first, second, own = images(sheet, 0), images(sheet, 1), images(usual, 0)
+    assert len(sheet) == len(usual) + 32 + CAPTION + MARGIN
     assert min(np.abs(first - second).mean(), np.abs(first - own).mean(), np.abs(second - own).mean()) > 5
 
 

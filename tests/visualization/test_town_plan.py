@@ -21,12 +21,13 @@ from caldrive.visualization.town_plan import (
     example_places,
     grid_steps,
     map_bounds,
+    notes,
     write_plan,
 )
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
-from tests.maps import sign_at, write_map
+from tests.maps import sign_at, straight, write_map
 
 
 def drawn(plan: TownPlan) -> Image:
@@ -121,6 +122,15 @@ def test_a_road_that_is_thinner_than_a_pixel_shows(tmp_path: Path) -> None:
     path = write_map(tmp_path, geometry=long, length=20_000)
     plan = TownPlan(load_roads(str(path)))
     picture = drawn(plan)
-    column, row = (round(float(value)) for value in plan.ax.transData.transform((7300, 7300)))
+    column, row = (round(float(value)) for value in plan.ax.transData.transform((200, 200)))
     around = picture[picture.shape[0] - row - 6 : picture.shape[0] - row + 6, column - 6 : column + 6]
     assert (around.min(axis=2) < 240).sum() > 12
+
+
+def test_the_plan_says_what_was_left_out_and_where_the_map_lies(tmp_path: Path) -> None:
+    path = write_map(tmp_path, straight(90_000, 0, 0, 100), signals=sign_at(400))
+    assert notes(load_roads(str(path))) == [
+        "The map was moved to the origin: its own coordinates are these plus (90000, 0).",
+        "Left out or changed: signals beyond the end of their road (1).",
+    ]
+    assert notes(load_roads("town02")) == []

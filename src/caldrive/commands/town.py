@@ -48,6 +48,7 @@ class Town(Output):
             width, height = write_sheet(self.town, sheet, self.width, self.randomised)
             values |= {"sheet": str(sheet), "width": width, "height": height}
             lines.append(f"{self.town} on one page: {sheet} ({width} x {height})")
+        values |= _of_map(self.town)
         return Answer(values, "\n".join(lines))
 
     def _check(self, sheet: Path | None) -> None:
@@ -64,3 +65,11 @@ class Town(Output):
             raise ValueError(
                 "found --randomised without --sheet, wanted both, as a plan has no looks: type --sheet FILE"
             )
+
+
+def _of_map(town: str) -> dict[str, Any]:
+    """What was left out of a map, and where it lies, for programs; people are told when it is loaded."""
+    from caldrive.world.roads.towns import load_roads
+
+    roads = load_roads(town)
+    return {"left_out": list(roads.dropped), "offset": list(roads.offset)}

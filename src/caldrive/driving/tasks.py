@@ -51,21 +51,31 @@ def _fits(route: Route, task: str) -> bool:
 
 
 def _random_pose(roads: RoadNetwork, before_end: float, rng: np.random.Generator) -> Pose:
-    """A place on a lane, at least so many metres before its end."""
+    """A place on a lane, at least so many metres before its end. Raises ValueError where all lanes are too short."""
     lanes = [lane for lane in roads.driveable if lane.line.length > before_end + _AFTER_START + 1]
+    if not lanes:
+        raise ValueError(
+            f"found no lane in {roads.name} that is longer than {before_end + _AFTER_START + 1:.0f} m, wanted one to "
+            "start on: give a larger map, or places of your own with --from and --to"
+        )
     shares = np.array([lane.line.length for lane in lanes])
     lane = lanes[int(rng.choice(len(lanes), p=shares / shares.sum()))]
     return lane.line.pose_at(float(rng.uniform(_AFTER_START, lane.line.length - before_end)))
 
 
 def draw_routes(roads: RoadNetwork, task: str, n: int, rng: np.random.Generator) -> list[tuple[Pose, Pose]]:
-    """n random pairs of start and goal that make a task. Raises ValueError where the map is too small for it."""
+    """Random pairs of start and goal that make a task: n, or as many as a map has that is too small for so many.
+
+    Raises ValueError where it has none.
+    """
     x0, y0, x1, y1 = roads.bounds
     scale = min(1.0, math.hypot(x1 - x0, y1 - y0) / _FULL_DIAGONAL)
     low, high = (scale * length for length in _LENGTHS[task])
     pairs: list[tuple[Pose, Pose]] = []
     for _ in range(_TRIES * n):
         start, goal = _random_pose(roads, _START_BEFORE_END, rng), _random_pose(roads, _GOAL_BEFORE_END, rng)
+        if math.hypot(goal.x - start.x, goal.y - start.y) > high:  # no way is shorter than the beeline
+            continue
         try:
             route = plan_route(roads, start, goal)
         except ValueError:
@@ -74,9 +84,12 @@ def draw_routes(roads: RoadNetwork, task: str, n: int, rng: np.random.Generator)
             pairs.append((start, goal))
             if len(pairs) == n:
                 return pairs
-    raise ValueError(
-        f"found {len(pairs)} routes for {task} in {roads.name}, wanted {n}: give a larger map, or another --task"
-    )
+    if not pairs:
+        raise ValueError(
+            f"found no route for {task} in {roads.name}, wanted one: give a larger map, another --task, or places of "
+            "your own with --from and --to"
+        )
+    return pairs
 
 
 @lru_cache(maxsize=1)
@@ -86,7 +99,8 @@ def _fixed_routes() -> dict[str, dict[str, list[list[list[float]]]]]:
 
 
 def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
-    """The 25 pairs of start and goal of a task; on maps that are not the package's, drawn from the seed.
+    """The 25 pairs of start and goal of a task; on maps that are not the package's, drawn from the seed, and fewer
+    where there are not so many.
 
     Raises ValueError for an unknown task and a map that is too small for it.
     """
@@ -117,7 +131,7 @@ def task_scenarios(
     time_limit: str = "paper",
     name: str | None = None,
 ) -> list[Scenario]:
-    """The 25 scenarios of a task.
+    """The 25 scenarios of a task, fewer on a map that has not so many routes for it.
 
     cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02).
     task: `nocrash` has that benchmark's routes. time_limit: a name in TIME_LIMITS. name: the scenarios' task,

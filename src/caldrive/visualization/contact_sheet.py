@@ -1,4 +1,5 @@
-"""A contact sheet of a town: camera images from a few places, in all weathers or in random looks, with captions."""
+"""A contact sheet of a town: camera images from a few places, in all weathers or in random looks, with captions, and
+below them the whole town from above."""
 
 from __future__ import annotations
 
@@ -16,12 +17,14 @@ from caldrive.checks import MOST_LOOKS, MOST_PIXELS, require_within, require_wri
 from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState, Pose, VehicleState
 from caldrive.files import write_whole
 from caldrive.geometry import moved
+from caldrive.visualization.town_plan import LEAST_WIDTH, TownPlan
 from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import WEATHERS
 from caldrive.world.town import load_town
 
+FEWEST_COLUMNS = 3  # wide enough for the town below
 MARGIN, CAPTION = 6, 18  # pixels between images, and of height of the line above each
 BACKGROUND, TEXT = (24, 25, 27), (226, 226, 222)
 BEFORE_LIGHT = 13.0  # m from the viewpoint to the stop line
@@ -66,7 +69,8 @@ def cars_and_people(pose: Pose) -> tuple[list[VehicleState], list[PedestrianStat
 def contact_sheet(
     town: str, size: tuple[int, int] = (320, 144), weathers: Sequence[int] = tuple(WEATHERS), randomised: int = 0
 ) -> Image:
-    """A picture (H, W, 3): a column for each viewpoint, a row for each weather; size: (width, height) of each image.
+    """A picture (H, W, 3): a column for each viewpoint, a row for each weather, and the town's plan below; size of each
+    image: (width, height).
 
     randomised: where it is not 0, the number of random looks of the town to show instead, one in each row, in the
     weathers in turn. Raises ValueError or FileNotFoundError as `load_roads` does.
@@ -75,7 +79,8 @@ def contact_sheet(
     rows = [(look, weathers[(look - 1) % len(weathers)]) for look in range(1, randomised + 1)]
     rows = rows or [(0, weather) for weather in weathers]
     cell = (size[0] + MARGIN, size[1] + CAPTION + MARGIN)
-    sheet = Picture.new("RGB", (len(viewpoints(roads)) * cell[0] + MARGIN, len(rows) * cell[1] + MARGIN), BACKGROUND)
+    columns = max(len(viewpoints(roads)), FEWEST_COLUMNS)
+    sheet = Picture.new("RGB", (columns * cell[0] + MARGIN, len(rows) * cell[1] + MARGIN), BACKGROUND)
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
     for look, group in groupby(enumerate(rows), lambda row: row[1][0]):
         camera = CameraRig(load_town(town, look))
@@ -85,7 +90,14 @@ def contact_sheet(
                 sheet.paste(Picture.fromarray(image), (x, y + CAPTION))
                 draw.text((x, y), _caption(roads.name, look, weather, name), TEXT, font)
         camera.close()
-    return np.asarray(sheet)
+    return np.concatenate((np.asarray(sheet), whole_town(roads, sheet.width)))
+
+
+def whole_town(roads: RoadNetwork, width: int) -> Image:
+    """A town from above (H, W, 3), so many pixels wide."""
+    picture = Picture.fromarray(TownPlan(roads, LEAST_WIDTH).picture(""))
+    height = max(1, round(picture.height * width / picture.width))
+    return np.asarray(picture.resize((width, height), Picture.Resampling.LANCZOS))
 
 
 def _caption(town: str, look: int, weather: int, place: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image as Picture
 
 from caldrive.checks import MOST_PIXELS, require_within, require_writable_file
-from caldrive.datatypes import Points, Pose
+from caldrive.datatypes import Image, Points, Pose
 from caldrive.files import write_figure
 from caldrive.geometry import box_corners, moved, to_world
 from caldrive.world.roads.network import Lane, RoadNetwork
@@ -24,6 +24,7 @@ DPI = 100
 FLATTEST, STEEPEST = 0.3, 1.4  # the map's height in its widths; a flatter or steeper town gets free ground around it
 AROUND = 0.04  # free ground around the roads, as a share of the longer side
 EDGES = (88, 34, 70, 146)  # pixels left, right, above and below the map, for the figures and the words
+LINE = 23  # pixels of one more line below
 STEPS = 9  # labelled lines of the grid from west to east, about
 PARTS = {1: 5, 2: 4, 5: 5}  # how many parts a step of the grid has, by its first digit, so that they are round, too
 NARROWEST = 3.0  # pixels that the thinnest road is drawn wide
@@ -70,7 +71,9 @@ class TownPlan:
         self.roads, self.bounds = roads, map_bounds(roads)
         x0, y0, x1, y1 = self.bounds
         self.steps = grid_steps(min(x1 - x0, 2 * (y1 - y0)))
+        self.notes = notes(roads)
         left, right, above, below = EDGES
+        below += LINE * len(self.notes)
         self.scale = (width - left - right) / (x1 - x0)  # pixels in a metre
         height = round((y1 - y0) * self.scale) + above + below
         self.figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
@@ -78,14 +81,22 @@ class TownPlan:
         self.ax = self.figure.add_axes(box, xlim=(x0, x1), ylim=(y0, y1))
 
     def draw(self, how_to: str) -> Any:
-        """The finished figure. how_to: a line below the map that says what to do with it."""
+        """The finished figure. how_to: what stands below the map, before what is to be known of it."""
         self._draw_grid()
         self._draw_lanes()
         self._draw_arrows()
         self._draw_lights()
         self._draw_signs()
-        self._write(how_to)
+        self._write("\n".join([*how_to.splitlines(), *self.notes]))
         return self.figure
+
+    def picture(self, how_to: str) -> Image:
+        """The finished map as a picture (H, W, 3)."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        canvas: Any = FigureCanvasAgg(self.draw(how_to))
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3]
 
     def metres(self, pixels: float) -> float:
         """How long so many pixels are on the map."""
@@ -144,16 +155,16 @@ class TownPlan:
         for post in self.roads.posts:
             (x, y), (u, v) = post.stop_line
             self.ax.plot((x, u), (y, v), color=STOP, lw=2.2, solid_capstyle="butt", zorder=5)
-            corners = box_corners(post.pose, self.metres(15), self.metres(7))
+            corners = box_corners(post.stands_at, self.metres(15), self.metres(7))
             self.ax.fill(corners[:, 0], corners[:, 1], color=POST, zorder=6)
             for k, color in enumerate(LAMPS):
-                lamp = moved(post.pose, forward=self.metres(4.4 * (1 - k)))
+                lamp = moved(post.stands_at, forward=self.metres(4.4 * (1 - k)))
                 self.ax.plot(lamp.x, lamp.y, ".", color=color, ms=3.4, mew=0, zorder=7)
 
     def _draw_signs(self) -> None:
         """A round sign beside the road, with a line to the foot of its post."""
         for sign in self.roads.signs:
-            foot, disc = sign.pose, moved(sign.pose, left=-self.metres(14))
+            foot, disc = sign.stands_at, moved(sign.stands_at, left=-self.metres(14))
             self.ax.plot((foot.x, disc.x), (foot.y, disc.y), color=POST, lw=1, zorder=6)
             self.ax.plot(disc.x, disc.y, "o", ms=14, mfc="white", mec=SIGN, mew=1.8, zorder=7)
             self.ax.text(disc.x, disc.y, str(sign.limit), fontsize=7.5, ha="center", va="center_baseline", zorder=8)
@@ -166,8 +177,17 @@ class TownPlan:
         left, top = EDGES[0] / width, 1 - 14 / height
         self.figure.text(left, top, self.roads.name, fontsize=16, weight="bold", va="top")
         self.figure.text(left, 14 / height, how_to, fontsize=11, va="bottom", linespacing=1.5)
-        self.figure.legend(handles=_keys(), loc="lower left", bbox_to_anchor=(left, 60 / height), ncols=5,
+        above = (60 + LINE * len(self.notes)) / height
+        self.figure.legend(handles=_keys(), loc="lower left", bbox_to_anchor=(left, above), ncols=5,
                            frameon=False, fontsize=11, borderaxespad=0.0, borderpad=0.3)  # fmt: skip
+
+
+def notes(roads: RoadNetwork) -> list[str]:
+    """What to know of a map that was moved, or of which something was left out."""
+    x, y = roads.offset
+    moved_by = f"The map was moved to the origin: its own coordinates are these plus ({x:.0f}, {y:.0f})."
+    left_out = f"Left out or changed: {', '.join(roads.dropped)}."
+    return [moved_by] * any(roads.offset) + [left_out] * bool(roads.dropped)
 
 
 def _keys() -> list[Any]:

@@ -122,13 +122,23 @@ class Episode:
         self._ego = replace(self._ego, pose=ego.pose, speed=ego.speed)
         return contacts
 
+    def _cars(self, progress: float) -> tuple[VehicleState, ...]:
+        """All other cars but those on a bridge over the route, or below it."""
+        if self._traffic is None:
+            return ()
+        cars, level, heights = self._traffic.cars, self.labels.level, self._traffic.heights
+        if level is None:
+            return (*cars, *self._parked.states())
+        there = [*((car, heights[car.id]) for car in cars), *((car.state, car.height) for car in self._parked.cars)]
+        return tuple(car for car, height in there if level.holds(car.pose.x, car.pose.y, height, progress))
+
     def _update(self, time: float, progress: float, contacts: tuple[Contact, ...]) -> None:
         """Takes down who is where now, and what is true of it."""
         with self._timed("pedestrians"):
             people = self._pedestrians.states()
         with self._timed("lights"):
             lights = self._lights.states()
-        vehicles = (*self._traffic.cars, *self._parked.states()) if self._traffic is not None else ()
+        vehicles = self._cars(progress)
         self.state = WorldState(
             time=time,
             ego=self._ego_box(),

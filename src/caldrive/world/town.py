@@ -10,6 +10,7 @@ import numpy as np
 
 from caldrive.datatypes import ContactKind, Pose, Sign
 from caldrive.geometry import positions, wrap_angle
+from caldrive.world.roads.levels import RouteLevel
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route
 from caldrive.world.roads.towns import load_roads, one_sentence
@@ -72,11 +73,13 @@ class Town:
     ground: GroundRaster
     obstacles: Obstacles
 
-    def limits_along(self, route: Route) -> list[tuple[float, float]]:
-        """Where which limit begins along a route (m, km/h)."""
+    def limits_along(self, route: Route, level: RouteLevel | None = None) -> list[tuple[float, float]]:
+        """Where which limit begins along a route (m, km/h); level: the route's, where roads run above each other."""
         limits = [(0.0, self.roads.lanes[route.lanes[0][0]].limit)]
         low, high = SIGN_BESIDE
         for sign in self.signs:
+            if level is not None and not level.holds(sign.pose.x, sign.pose.y, sign.height):
+                continue
             hit = route.line.project(sign.pose.x, sign.pose.y)
             if low < hit.left < high and abs(wrap_angle(hit.heading - sign.pose.heading)) < SAME_WAY:
                 limits.append((hit.s, float(sign.limit)))

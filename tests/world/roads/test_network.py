@@ -12,7 +12,6 @@ import shapely
 from caldrive.datatypes import Command, Pose, Sign
 from caldrive.geometry import moved, to_local, wrap_angle
 from caldrive.world.roads.network import SIDEWALK_WIDTH, Lane, RoadNetwork
-from caldrive.world.roads.sumo_reader import read_roads
 from caldrive.world.truth.labels import A1
 
 
@@ -190,20 +189,6 @@ def test_the_lane_under_a_pose_is_the_one_that_runs_its_way(town01: RoadNetwork)
 def test_a_pose_off_the_road_or_across_it_is_on_no_lane(pose: Pose, town01: RoadNetwork) -> None:
     with pytest.raises(ValueError, match="found no lane of town01"):
         town01.lane_at(pose)
-
-
-def test_standing_posts_are_given_to_the_approach_that_they_face(town02: RoadNetwork) -> None:
-    shifted = [moved(post.pose, forward=4.0, left=-0.7) for post in town02.posts]
-    away = [moved(pose, turn=math.pi) for pose in shifted]
-    again = read_roads("again", town02.network, appearance="town02", posts=[*away, *shifted], signs=[])
-    poses = {post.lane: post.pose for post in again.posts}
-    assert poses == {post.lane: pose for post, pose in zip(town02.posts, shifted, strict=True)}
-    assert again.signs == ()
-
-
-def test_an_approach_without_a_standing_post_has_no_light(town02: RoadNetwork) -> None:
-    again = read_roads("again", town02.network, appearance="town02", posts=[town02.posts[0].pose], signs=[])
-    assert [post.lane for post in again.posts] == [town02.posts[0].lane]
 
 
 @pytest.mark.filterwarnings("error")

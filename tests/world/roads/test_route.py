@@ -5,16 +5,28 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import networkx as nx
 import numpy as np
 import pytest
 
+from caldrive.agents.cal import CALAgent, OraclePerception
+from caldrive.control.controller import CALController
 from caldrive.datatypes import Command, Pose
+from caldrive.driving.rollout import run_episode
 from caldrive.geometry import Polyline, moved, wrap_angle
+from caldrive.results import Outcome
+from caldrive.scenarios import Scenario
+from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.roads.route import COMMAND_AHEAD, Route, follow_lanes, plan_route, random_route
+from caldrive.world.roads.towns import load_roads
+from tests.maps import lane, lanes, link, road, straight, write_roads
 
+needs_netconvert = pytest.mark.skipif(
+    not pytest.importorskip("importlib.util").find_spec("sumo"), reason="netconvert comes with the extra opendrive"
+)
 SIDES = {Command.LEFT: 1, Command.RIGHT: -1, Command.STRAIGHT: 0}
 
 
@@ -131,9 +143,9 @@ def test_a_route_has_time_at_10_kmh(town01: RoadNetwork) -> None:
 
 def test_no_way_through_the_lanes_is_shorter_than_the_route(town: RoadNetwork) -> None:
     graph = nx.DiGraph()
-    for lane in town.lanes.values():
-        for successor in lane.successors:
-            graph.add_edge(lane.id, successor, length=lane.line.length)
+    for each in town.lanes.values():
+        for successor in each.successors:
+            graph.add_edge(each.id, successor, length=each.line.length)
     for start, goal, route in some_routes(town, 30, seed=1):
         (first, s), (last, end) = town.lane_at(start), town.lane_at(goal)
         if first.id == last.id:
@@ -196,3 +208,64 @@ def test_a_way_too_short_to_follow_is_refused_in_a_sentence(town02: RoadNetwork)
     roads = replace(town02, lanes={"stub_0": stub})
     with pytest.raises(ValueError, match=r"found a way of 0\.01 m in town02 .*wanted a longer one"):
         follow_lanes(roads, ["stub_0"], 0.0, 0.01)
+
+
+def write_forced_change(folder: Path) -> Path:
+    """Road 1 of two lanes, of which the left one goes on as road 2."""
+    pair, right = lanes(lane(-1, link=". -1") + lane(-2)), lanes(lane(-1, link="-1 ."))
+    return write_roads(
+        folder,
+        road(1, straight(0, 0, 0, 200), pair, link("successor", "road", 2, "start")),
+        road(2, straight(200, 0, 0, 200), right, link("predecessor", "road", 1, "end")),
+    )
+
+
+@needs_netconvert
+def test_a_route_changes_lanes_where_no_other_way_leads_to_the_goal(tmp_path: Path) -> None:
+    roads = load_roads(str(write_forced_change(tmp_path)))
+    start, goal = Pose(20, -6, 0), Pose(350, -2, 0)
+    route = plan_route(roads, start, goal)
+    (change,) = route.changes
+    assert change.to_left
+    assert 20 < change.start < change.end < 180
+    assert route.length == pytest.approx(330, abs=1)
+    left = [route.line.points_at(np.array([s]))[0, 1] for s in (0, change.start, change.end, route.length)]
+    assert left == pytest.approx([-6, -6, -2, -2], abs=0.05)
+    assert route.line.length == pytest.approx(380, abs=2)
+    assert max(abs(route.line.heading_at(float(s))) for s in range(0, 330, 2)) < math.radians(12), "a smooth step"
+    assert [name for name, _ in route.lanes][:2] == ["-1_0", "-1_1"]
+
+
+@needs_netconvert
+def test_a_route_that_needs_no_change_has_none(tmp_path: Path) -> None:
+    roads = load_roads(str(write_forced_change(tmp_path)))
+    assert plan_route(roads, Pose(20, -2, 0), Pose(350, -2, 0)).changes == ()
+
+
+@needs_netconvert
+@pytest.mark.parametrize(("start", "goal"), [(185, 350), (60, 70)], ids=["too late", "too near"])
+def test_without_room_for_a_change_there_is_no_way(start: float, goal: float, tmp_path: Path) -> None:
+    roads = load_roads(str(write_forced_change(tmp_path)))
+    with pytest.raises(ValueError, match="found no way from"):
+        plan_route(roads, Pose(start, -6, 0), Pose(goal, -2, 0))
+
+
+@needs_netconvert
+def test_a_goal_on_the_lane_beside_is_reached_by_a_change(tmp_path: Path) -> None:
+    roads = load_roads(str(write_forced_change(tmp_path)))
+    for (y, z), to_left in (((-6, -2), True), ((-2, -6), False)):
+        route = plan_route(roads, Pose(20, y, 0), Pose(120, z, 0))
+        assert [change.to_left for change in route.changes] == [to_left]
+        assert (route.length, route.line.pose_at(route.length).y) == pytest.approx((100, z), abs=0.3)
+        assert route.changes[0].end < route.length
+
+
+@needs_netconvert
+def test_the_oracle_changes_lanes_and_arrives(tmp_path: Path) -> None:
+    path = str(write_forced_change(tmp_path))
+    world = EmbeddedWorld()
+    agent = CALAgent(OraclePerception(world.truth), CALController())
+    scenario = Scenario(town=path, weather=1, start=Pose(20, -6, 0), goal=Pose(350, -2, 0), time_limit=90.0)
+    result = run_episode(world, agent, scenario)
+    world.close()
+    assert (result.outcome, result.infractions) == (Outcome.SUCCESS, ())

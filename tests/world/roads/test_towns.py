@@ -29,7 +29,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_town_is_loaded_once(town01: RoadNetwork) -> None:
-    assert load_roads("town01") is town01
+    assert load_roads("town01") is load_roads("town01")
     assert town01.name == town01.appearance == "town01"
 
 
@@ -57,7 +57,7 @@ def test_whatever_goes_wrong_names_the_map(
     def fail(_: bytes) -> None:
         raise break_it("deep inside")
 
-    monkeypatch.setattr("caldrive.world.roads.opendrive.read_furniture", fail)
+    monkeypatch.setattr("caldrive.world.roads.opendrive.read_map", fail)
     with pytest.raises(ValueError, match=rf"road\.xodr cannot be read \({break_it.__name__}: .*give another"):
         load_roads(str(write_map(tmp_path)))
 
@@ -90,7 +90,7 @@ def test_a_straight_road_becomes_a_town_with_two_lanes_and_its_sign(cache: Path,
     assert roads.name == "road"
     assert len(roads.driveable) == 2
     (sign,) = roads.signs
-    assert (sign.pose.x, sign.pose.y, sign.limit) == pytest.approx((30, -5, 60), abs=0.05)
+    assert (sign.pose.x, sign.pose.y, sign.limit) == pytest.approx((30, -5.1, 60), abs=0.05)
     lane, s = roads.lane_at(Pose(30, -2, 0))
     assert s == pytest.approx(30, abs=0.1)
     assert to_local(lane.line.pose_at(s), lane.line.points)[:, 1] == pytest.approx(0, abs=0.01)
@@ -132,3 +132,19 @@ def test_without_netconvert_the_message_names_the_extra(monkeypatch: pytest.Monk
     monkeypatch.setitem(__import__("sys").modules, "sumo", None)
     with pytest.raises(RuntimeError, match=r"pip install 'caldrive\[opendrive\]'"):
         netconvert.netconvert_binary()
+
+
+@needs_netconvert
+def test_a_town_far_from_the_origin_is_the_same_town(tmp_path: Path) -> None:
+    arc = '<geometry s="0" x="{x}" y="{y}" hdg="0.4" length="200"><arc curvature="0.01"/></geometry>'
+    towns = []
+    for name, (x, y) in (("near", (7.25, -3.5)), ("far", (500_007.25, 5_399_996.5))):
+        (tmp_path / name).mkdir()
+        path = write_map(tmp_path / name, arc.format(x=x, y=y), sign_at(100), length=200)
+        towns.append(load_town(str(path)))
+    near, far = towns
+    assert list(far.roads.offset) == [500_000, 5_400_000]
+    assert far.signs == near.signs
+    assert far.scenery == near.scenery
+    for lane in near.roads.driveable:
+        assert (far.roads.lanes[lane.id].line.points == lane.line.points).all()

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from caldrive.datatypes import Pose
-from caldrive.world.scene import shadows
 from caldrive.world.scene.scenery import Prop
 from caldrive.world.scene.shadows import (
+    LARGEST,
     RESOLUTION,
     TALLEST_SHADOW,
     cast_shadows,
+    shadow_bounds,
     shadow_heights,
 )
 
@@ -36,11 +39,12 @@ def test_a_house_shades_what_lies_behind_it() -> None:
     assert row[round((40 + 9) / RESOLUTION)] == 0
 
 
-def test_the_picture_of_a_large_town_is_no_larger_than_graphics_take(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shadows, "MOST_PIXELS", 400)
-    house = Prop("building", Pose(0.0, 0.0, 0.0), length=10.0, width=10.0, height=8.0)
-    sun = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5)])
-    shade = shadow_heights((house,), (-100.0, -50.0, 100.0, 50.0), sun)[..., 1]  # pixels of half a metre
-    assert shade.shape == (200, 400)
-    assert shade[100, round((100 - 9) / 0.5)] > 0
-    assert shade[100, round((100 + 9) / 0.5)] == 0
+@given(st.floats(-2e4, 2e4), st.floats(-2e4, 2e4))
+def test_of_a_large_town_the_part_around_a_place_is_drawn(x: float, y: float) -> None:
+    x0, y0, x1, y1 = shadow_bounds((-2e4, -2e4, 2e4, 2e4), x, y)
+    assert (x1 - x0, y1 - y0) == (LARGEST, LARGEST)
+    assert min(x - x0, x1 - x, y - y0, y1 - y) >= LARGEST / 4, "as far as one can see"
+
+
+def test_a_small_town_is_drawn_whole_wherever_one_stands() -> None:
+    assert {shadow_bounds((0.0, 0.0, 400.0, 300.0), x, x) for x in (0.0, 390.0, 900.0)} == {(-30, -30, 430, 330)}

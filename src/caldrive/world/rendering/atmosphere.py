@@ -14,10 +14,12 @@ from caldrive.world.rendering.texturing import Materials, Texels, packed, texels
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.scene.appearance import Appearance
 from caldrive.world.scene.scenery import Prop
-from caldrive.world.scene.shadows import shadow_bounds, shadow_heights
+from caldrive.world.scene.shadows import Bounds, shadow_bounds, shadow_heights
 from caldrive.world.scene.sky import panorama
 from caldrive.world.scene.textures import texture_layers
 from caldrive.world.scene.weather import lighting, weather
+
+KEPT = 6  # shadows that are remembered, up to 64 MB each
 
 
 class Atmosphere:
@@ -25,30 +27,45 @@ class Atmosphere:
 
     def __init__(self, roads: RoadNetwork, scenery: Sequence[Prop], appearance: Appearance) -> None:
         self.roads, self.scenery, self.appearance = roads, scenery, appearance
-        self._weathers: dict[int, tuple[Light, Materials]] = {}
-        self._shadows: dict[float, Integers] = {}  # by the sun's altitude
+        self._lights: dict[tuple[int, Bounds], Light] = {}
+        self._materials: dict[int, Materials] = {}
+        self._shadows: dict[tuple[float, Bounds], Integers] = {}  # by the sun's altitude, and what they cover
 
-    def in_weather(self, id: int) -> tuple[Light, Materials]:
-        """Light and materials in a weather. Raises ValueError for an unknown one."""
-        if id not in self._weathers:
-            self._weathers[id] = self._made(id)
-        return self._weathers[id]
+    def in_weather(self, id: int, x: float, y: float) -> tuple[Light, Materials]:
+        """Light and materials in a weather, around a place in m. Raises ValueError for an unknown weather."""
+        bounds = shadow_bounds(self.roads.bounds, x, y)
+        if (id, bounds) not in self._lights:
+            self._lights[id, bounds] = self._light(id, bounds)
+        if id not in self._materials:
+            self._materials[id] = self._made(id)
+        return self._lights[id, bounds], self._materials[id]
 
-    def _made(self, id: int) -> tuple[Light, Materials]:
-        current, bounds, paint = weather(id), shadow_bounds(self.roads.bounds), self.appearance.paint
+    def _light(self, id: int, bounds: Bounds) -> Light:
+        current = weather(id)
+        light, key = lighting(current, self.appearance.sun_azimuth), (current.sun_altitude, bounds)
+        if key not in self._shadows:
+            if len(self._shadows) >= KEPT:
+                self._forget(next(iter(self._shadows)))
+            self._shadows[key] = packed_shadows(shadow_heights(self.scenery, bounds, light.sun_direction))
+        return light_of(light, self._shadows[key], bounds)
+
+    def _forget(self, key: tuple[float, Bounds]) -> None:
+        """Forgets shadows, and the lights that hold on to them."""
+        del self._shadows[key]
+        for other in [other for other in self._lights if other[1] == key[1]]:
+            del self._lights[other]
+
+    def _made(self, id: int) -> Materials:
+        current, paint = weather(id), self.appearance.paint
         light = lighting(current, self.appearance.sun_azimuth)
-        if current.sun_altitude not in self._shadows:
-            self._shadows[current.sun_altitude] = packed_shadows(
-                shadow_heights(self.scenery, bounds, light.sun_direction)
-            )
         sky = packed(panorama(current, light, zlib.crc32(self.roads.name.encode())))
         colors = [(*color, 0.0) for color in (paint.center, paint.edge, paint.asphalt)]
-        materials = Materials(layers(), sky, np.array([*colors, paint.widths], np.float32))
-        return light_of(light, self._shadows[current.sun_altitude], bounds), materials
+        return Materials(layers(), sky, np.array([*colors, paint.widths], np.float32))
 
     def close(self) -> None:
         """Forgets all of them."""
-        self._weathers.clear()
+        self._lights.clear()
+        self._materials.clear()
         self._shadows.clear()
 
 

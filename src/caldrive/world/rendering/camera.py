@@ -64,8 +64,9 @@ class CameraRig:
         return self.render_from([camera_on(state.ego, mount) for mount in mounts], state)
 
     def render_from(self, cameras: Sequence[PinholeCamera], state: SceneState) -> list[Image]:
-        """One picture (H, W, 3) for each camera."""
-        light, materials = self._atmosphere.in_weather(state.weather)
+        """One picture (H, W, 3) for each camera; all of them are near each other."""
+        here = cameras[0].pose if cameras else state.ego.pose
+        light, materials = self._atmosphere.in_weather(state.weather, here.x, here.y)
         over = Overlays(self._lamps.lit(state.lights, float(light.wetness)), self._drops, f32(state.time % 64))
         return [
             self._canvas(camera.size, SAMPLES).image(
@@ -76,7 +77,8 @@ class CameraRig:
 
     def render_semantics(self, state: SceneState, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
         """What each pixel of `render`'s pictures shows, (H, W) for each mount, as numbers of `Semantic`."""
-        light, materials = self._atmosphere.in_weather(state.weather)
+        here = state.ego.pose
+        light, materials = self._atmosphere.in_weather(state.weather, here.x, here.y)
         return [
             self._canvas(camera.size, 1).classes(self._drawn(camera, state), Scene(materials, light, camera.view()))
             for camera in (camera_on(state.ego, mount) for mount in mounts)

@@ -44,7 +44,8 @@ class Lamps:
     def lit(self, lights: Mapping[str, LightState], wetness: float) -> Rows:
         """Rows for `draw_lamps`, from what the lights show, by LightPost.id; on a wet road also their streaks."""
         if lights != self._last[0]:
-            rows = [_lamp(post.pose, lights[post.id]) for post in self._posts if post.id in lights]
+            shown = {post.stands_at: lights[post.id] for post in self._posts if post.id in lights}
+            rows = [_lamp(*of_post) for of_post in shown.items()]
             self._last = dict(lights), np.array(rows, dtype=np.float32).reshape(-1, 8)
         lamps = self._last[1]
         return np.concatenate((lamps, lamps + STREAK * np.float32(0.40 * wetness))) if wetness > 0 else lamps

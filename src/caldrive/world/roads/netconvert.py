@@ -7,7 +7,7 @@ import re
 import resource
 import signal
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -22,16 +22,11 @@ _LIMITS = {  # they hold even where this process is gone, and nobody waits
     resource.RLIMIT_CORE: 0,
 }  # fmt: skip
 
-# Without these types an OpenDRIVE sidewalk takes cars, which then never move.
-_CLOSED = (
-    "shoulder", "border", "stop", "none", "restricted", "parking", "median", "curb", "biking", "special1", "rail",
-    "tram",
-)  # fmt: skip
-_LANE_TYPES = """<types>
+# `opendrive_repairs` leaves these types of lanes; without them netconvert lets cars drive on sidewalks.
+_LANE_TYPES = b"""<types>
   <type id="driving" numLanes="1" speed="13.89" disallow="pedestrian"/>
-  <type id="sidewalk" numLanes="1" speed="1.4" allow="pedestrian"/>
-  {closed}
-</types>""".format(closed="\n  ".join(f'<type id="{name}" numLanes="1" disallow="all"/>' for name in _CLOSED)).encode()
+  <type id="none" numLanes="1" disallow="all"/>
+</types>"""
 _OPENDRIVE = (
     "--opendrive.internal-shapes", "--opendrive.import-all-lanes", "--opendrive.curve-resolution=0.5",
     "--offset.disable-normalization",
@@ -112,9 +107,13 @@ def _reason(code: int, said: str) -> str:
     return f"netconvert says: {errors[0] if errors else 'nothing'}"
 
 
-def convert_opendrive(content: bytes) -> bytes:
-    """An OpenDRIVE map as a SUMO network. Raises ValueError with netconvert's reason where the map is no use."""
-    return run_netconvert({"opendrive-files": content, "type-files": _LANE_TYPES}, _OPENDRIVE)
+def convert_opendrive(content: bytes, junctions: Iterable[str] = ()) -> bytes:
+    """An OpenDRIVE map as a SUMO network. junctions: ids of those with lights.
+
+    Raises ValueError with netconvert's reason where the map is no use.
+    """
+    lights = [f"--tls.set={','.join(sorted(junctions))}"] if junctions else []
+    return run_netconvert({"opendrive-files": content, "type-files": _LANE_TYPES}, [*_OPENDRIVE, *lights])
 
 
 def conversion() -> bytes:

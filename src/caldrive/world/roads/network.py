@@ -16,11 +16,12 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Command, Pose, Sign
-from caldrive.geometry import Polyline
+from caldrive.geometry import Polyline, moved
 
 SIDEWALK_WIDTH = 3.0  # m
 POST_BESIDE_LANE = 1.1  # m from the kerb to the foot of a post
 ON_LANE = 4.0  # m from a lane's middle within which a place is on it
+CLEARANCE = 2.5  # m between two roads of which one runs above the other
 OUT_OF_THE_WORLD = 1e8  # m from the origin
 StopLine = tuple[tuple[float, float], tuple[float, float]]  # its ends, left end first, m
 
@@ -44,11 +45,33 @@ class Lane:
     """The command that leads along it, for internal lanes of true junctions."""
     light: tuple[str, int] | None = None
     """The traffic light that it obeys: its id, and the link of it."""
+    heights: NDArray[np.float64] | None = None
+    """m, at each point of the line; None at 0."""
+
+    def height(self, s: float) -> float:
+        """The height s m along it, m."""
+        return 0.0 if self.heights is None else float(np.interp(s, self.line.s, self.heights))
+
+    @property
+    def edge(self) -> str:
+        """The id of the lanes side by side that it is one of (SUMO's edge)."""
+        return self.id.rsplit("_", 1)[0]
+
+    @property
+    def stop_line(self) -> StopLine:
+        """Across its end."""
+        end = self.line.pose_at(self.line.length)
+        left, right = moved(end, left=self.width / 2), moved(end, left=-self.width / 2)
+        return (left.x, left.y), (right.x, right.y)
+
+    def post_beside(self, s: float) -> Pose:
+        """Where a post stands on its right, s m along it, facing its traffic."""
+        return moved(self.line.pose_at(s), left=-(self.width / 2 + POST_BESIDE_LANE))
 
 
 @dataclass(frozen=True)
 class LightPost:
-    """A post with a light for one approach of a junction."""
+    """A light for one lane that leads into a junction."""
 
     light: str
     """The junction's traffic light."""
@@ -57,14 +80,28 @@ class LightPost:
     links: tuple[int, ...]
     """The light's links (SUMO's) that begin on the lane."""
     pose: Pose
-    """Of its foot; the heading is that of the traffic that it faces."""
+    """Right beside the lane's end, with the heading of its traffic: what labels go by."""
     stop_line: StopLine
     """Across the lane's end."""
+    foot: Pose | None = None
+    """Where the post stands, if it is not there."""
+    height: float = 0.0
+    """Of the road there, m."""
 
     @cached_property
     def id(self) -> str:
         """Of the light and the lane."""
         return f"{self.light}/{self.lane}"
+
+    @property
+    def approach(self) -> tuple[str, str]:
+        """The light and the edge: lanes side by side are green together."""
+        return self.light, self.lane.rsplit("_", 1)[0]
+
+    @property
+    def stands_at(self) -> Pose:
+        """Where the post is to be seen."""
+        return self.foot or self.pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +117,10 @@ class RoadNetwork:
     """By their ids."""
     posts: tuple[LightPost, ...]
     signs: tuple[Sign, ...]
+    offset: tuple[float, float] = (0.0, 0.0)
+    """m to add to a place for that in the map's file: a map that lies far away is moved to the origin."""
+    dropped: tuple[str, ...] = ()
+    """What of the map was left out or changed, such as `signals without a type (2)`."""
 
     @cached_property
     def roadway(self) -> shapely.Geometry:
@@ -105,6 +146,25 @@ class RoadNetwork:
     def driveable(self) -> tuple[Lane, ...]:
         """Lanes outside junctions, in the order of their ids."""
         return tuple(lane for _, lane in sorted(self.lanes.items()) if not lane.internal)
+
+    def beside(self, lane: Lane) -> tuple[str, ...]:
+        """The ids of the lanes right and left of one, that run its way; none inside junctions."""
+        if lane.internal:
+            return ()
+        edge, _, index = lane.id.rpartition("_")
+        ids = (f"{edge}_{int(index) - 1}", f"{edge}_{int(index) + 1}")
+        return tuple(id for id in ids if id in self.lanes)
+
+    @staticmethod
+    def is_left_of(lane: Lane, other: Lane) -> bool:
+        """Which of two lanes side by side is on the left: SUMO counts them from the right."""
+        return int(lane.id.rpartition("_")[2]) > int(other.id.rpartition("_")[2])
+
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether no road can run above another."""
+        heights = [np.zeros(1) if lane.heights is None else lane.heights for lane in self.lanes.values()]
+        return float(np.ptp(np.concatenate(heights))) < CLEARANCE
 
     @cached_property
     def _boxes(self) -> NDArray[np.float64]:

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import sumolib
 
-from caldrive.datatypes import Command, Points, Pose, Sign
-from caldrive.geometry import Polyline, moved, to_local, wrap_angle
-from caldrive.world.roads.network import POST_BESIDE_LANE, Lane, LightPost, RoadNetwork, StopLine
+from caldrive.datatypes import Command, Points, Sign
+from caldrive.geometry import Polyline
+from caldrive.world.roads.network import Lane, LightPost, RoadNetwork
 
 SHORTEST_LANE = 1e-3  # m; shorter ones only join others
 BROADEST = 50.0  # m, of a lane
 FARTHEST, WIDEST, LONGEST = 10_000, 30, 300  # km: from the origin, from side to side, all lanes together
-MOST_AHEAD, SIDE = 12.0, (-9.0, -1.0)  # m from a lane's end, ahead and to the left, where its post on a map may stand
 AFTER_LIMIT_CHANGE = 2.0  # m behind which the sign stands
 SIGN_SHARE, SIGN_LEAST = 0.4, 40.0  # where on a street after a junction its sign stands, and how long (m) it must be
 _TURNS = {"l": Command.LEFT, "L": Command.LEFT, "r": Command.RIGHT, "R": Command.RIGHT, "s": Command.STRAIGHT}
 
 
-def read_roads(
-    name: str, network: Path, appearance: str, posts: list[Pose] | None = None, signs: Iterable[Sign] | None = None
-) -> RoadNetwork:
-    """Reads a SUMO network. posts and signs: those of an OpenDRIVE map; None puts them where our towns have them.
+def read_roads(name: str, network: Path, appearance: str) -> RoadNetwork:
+    """Reads a SUMO network, with lights and signs where our towns have them.
 
     Raises ValueError with the reason where it has no lane to drive on.
     """
@@ -34,12 +29,7 @@ def read_roads(
     lanes = _join(net, _read_lanes(net))
     _require_town(lanes)
     return RoadNetwork(
-        name=name,
-        network=network,
-        appearance=appearance,
-        lanes=lanes,
-        posts=_read_posts(net, lanes, posts),
-        signs=tuple(signs) if signs is not None else signs_at_limit_changes(lanes),
+        name, network, appearance, lanes=lanes, posts=_read_posts(net, lanes), signs=signs_at_limit_changes(lanes)
     )
 
 
@@ -70,15 +60,17 @@ def _read_lanes(net: sumolib.net.Net) -> dict[str, Lane]:
     lanes: dict[str, Lane] = {}
     for edge in net.getEdges(withInternal=True):
         for raw in edge.getLanes():
-            points = np.array(raw.getShape())[:, :2]
+            points, heights = np.array(raw.getShape())[:, :2], [place[2] for place in raw.getShape3D()]
             if not _allows_cars(raw) or not _is_line(points):
                 continue
+            line = Polyline(points)
             lanes[raw.getID()] = Lane(
                 id=raw.getID(),
-                line=Polyline(points),
+                line=line,
                 width=raw.getWidth(),
                 limit=raw.getSpeed() * 3.6,
                 internal=edge.getFunction() == "internal",
+                heights=np.array(heights)[line.kept] if any(heights) else None,
             )
     return lanes
 
@@ -101,6 +93,7 @@ def _join(net: sumolib.net.Net, lanes: dict[str, Lane]) -> dict[str, Lane]:
     turns: dict[str, tuple[Command | None, tuple[str, int] | None]] = {}
     for lane in lanes.values():
         onward = [c for c in net.getLane(lane.id).getOutgoing() if c.getToLane().getID() in lanes]
+        forks = len({c.getTo().getID() for c in onward}) > 1
         successors = tuple(c.getViaLaneID() if c.getViaLaneID() in lanes else c.getToLane().getID() for c in onward)
         joined[lane.id] = replace(lane, successors=successors)
         for connection, via in zip(onward, successors, strict=True):
@@ -108,7 +101,7 @@ def _join(net: sumolib.net.Net, lanes: dict[str, Lane]) -> dict[str, Lane]:
                 if lanes[via].internal:
                     turns.setdefault(via, (None, None))
                 continue
-            turn = _TURNS.get(connection.getDirection()) if _is_junction(connection.getJunction()) else None
+            turn = _TURNS.get(connection.getDirection()) if forks or _is_junction(connection.getJunction()) else None
             light = (connection.getTLSID(), connection.getTLLinkIndex()) if connection.getTLSID() else None
             turns[via] = turn, light
     for via, (turn, light) in turns.items():
@@ -117,42 +110,17 @@ def _join(net: sumolib.net.Net, lanes: dict[str, Lane]) -> dict[str, Lane]:
     return joined
 
 
-def stop_line(lane: Lane) -> StopLine:
-    """The two ends (x, y) of the stop line across a lane's end, left end first, m."""
-    end = lane.line.pose_at(lane.line.length)
-    left, right = moved(end, left=lane.width / 2), moved(end, left=-lane.width / 2)
-    return (left.x, left.y), (right.x, right.y)
-
-
-def post_beside(lane: Lane, s: float) -> Pose:
-    """Where a post stands on the right of a lane, s m along it, facing its traffic."""
-    return moved(lane.line.pose_at(s), left=-(lane.width / 2 + POST_BESIDE_LANE))
-
-
-def _read_posts(net: sumolib.net.Net, lanes: dict[str, Lane], on_map: list[Pose] | None) -> tuple[LightPost, ...]:
-    """One post for each approach to a light: at the stop line, or the post on a map that faces it."""
+def _read_posts(net: sumolib.net.Net, lanes: dict[str, Lane]) -> tuple[LightPost, ...]:
+    """A light for each lane that leads into a junction with lights, at its stop line."""
     posts = []
     for lane in lanes.values():
         links = [c for c in net.getLane(lane.id).getOutgoing() if c.getTLSID()]
         if lane.internal or not links or net.getEdge(links[0].getFrom().getID()).getToNode().getType() == "dead_end":
             continue
-        pose = post_beside(lane, lane.line.length) if on_map is None else _facing(on_map, lane)
-        if pose is not None:
-            indices = tuple(sorted(c.getTLLinkIndex() for c in links))
-            posts.append(LightPost(links[0].getTLSID(), lane.id, links=indices, pose=pose, stop_line=stop_line(lane)))
+        indices = tuple(sorted(c.getTLLinkIndex() for c in links))
+        pose = lane.post_beside(lane.line.length)
+        posts.append(LightPost(links[0].getTLSID(), lane.id, links=indices, pose=pose, stop_line=lane.stop_line))
     return tuple(posts)
-
-
-def _facing(posts: list[Pose], lane: Lane) -> Pose | None:
-    """The nearest post at the right of a lane's end that faces its traffic, or None."""
-    end = lane.line.pose_at(lane.line.length)
-    near = []
-    for pose in posts:
-        ahead, left = to_local(end, np.array([pose.x, pose.y]))
-        beside = -MOST_AHEAD < ahead < MOST_AHEAD and SIDE[0] < left < SIDE[1]
-        if beside and abs(wrap_angle(pose.heading - end.heading)) < math.pi / 4:
-            near.append((abs(ahead), pose))
-    return min(near, key=lambda pair: pair[0])[1] if near else None
 
 
 def signs_at_limit_changes(lanes: dict[str, Lane]) -> tuple[Sign, ...]:
@@ -167,7 +135,7 @@ def signs_at_limit_changes(lanes: dict[str, Lane]) -> tuple[Sign, ...]:
         limit = round(lane.limit)
         after_junction = via is None or via.turn is not None
         if previous is not None and not after_junction and round(previous.limit) != limit:
-            signs.append(Sign(post_beside(lane, AFTER_LIMIT_CHANGE), limit))
+            signs.append(Sign(lane.post_beside(AFTER_LIMIT_CHANGE), limit))
         elif after_junction and lane.line.length > SIGN_LEAST:
-            signs.append(Sign(post_beside(lane, lane.line.length * SIGN_SHARE), limit))
+            signs.append(Sign(lane.post_beside(lane.line.length * SIGN_SHARE), limit))
     return tuple(signs)

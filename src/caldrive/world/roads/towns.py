@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import lru_cache
+from multiprocessing import parent_process
 from pathlib import Path
 
 from caldrive.scenarios import TOWNS
@@ -35,18 +38,33 @@ def load_roads(town: str) -> RoadNetwork:
 
 
 def _load_opendrive(path: Path) -> RoadNetwork:
+    from caldrive.world.roads.map_furniture import furnish
     from caldrive.world.roads.netconvert import conversion, convert_opendrive, netconvert_binary
-    from caldrive.world.roads.opendrive import read_furniture
+    from caldrive.world.roads.opendrive import read_map
 
     netconvert_binary()  # else every map would seem broken
-    content = _read_map(path)
+    content = _content(path)
     with one_sentence(str(path)):
-        posts, signs = read_furniture(content)
-        network = kept_network(digest(content, conversion()), lambda: convert_opendrive(content))
-        return read_roads(path.stem, network, appearance="town01", posts=posts, signs=signs)
+        on_map = read_map(content)
+        junctions = sorted(on_map.signals.junctions)
+        network = kept_network(
+            digest(on_map.roads, repr(junctions).encode(), conversion()),
+            lambda: convert_opendrive(on_map.roads, junctions),
+        )
+        roads, dropped = furnish(read_roads(path.stem, network, appearance="town01"), on_map.signals)
+    lost = tuple(f"{what} ({n})" for what, n in sorted((on_map.dropped + dropped).items()))
+    _say_once(path, lost)
+    return replace(roads, offset=on_map.offset, dropped=lost)
 
 
-def _read_map(path: Path) -> bytes:
+def _say_once(path: Path, lost: tuple[str, ...]) -> None:
+    """Tells the user what was left out of a map; one of several processes does."""
+    if lost and parent_process() is None:
+        with suppress(OSError, ValueError):  # nobody may listen any more
+            print(f"caldrive: left out or changed in {path.name}: {', '.join(lost)}", file=sys.stderr)
+
+
+def _content(path: Path) -> bytes:
     """The bytes of a map. Raises ValueError for a file that is too large to be one, OSError where it is unreadable."""
     with path.open("rb") as file:
         content = file.read(MOST_MEGABYTES * 10**6 + 1)

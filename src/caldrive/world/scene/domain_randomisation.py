@@ -66,11 +66,13 @@ def town_appearance(town: str, number: int) -> Appearance:
 
 
 def town_signs(signs: Sequence[Sign], number: int) -> tuple[Sign, ...]:
-    """A town's own signs for appearance 0; else each 60 or 90 is any of the two."""
+    """A town's own signs for appearance 0; else each post with 60 or 90 has any of the two."""
     if number == 0:
         return tuple(signs)
     rng = np.random.default_rng([20181030, number])
-    return tuple(replace(sign, limit=one_of(FAST, rng)) if sign.limit in FAST else sign for sign in signs)
+    posts = {sign.stands_at: sign.limit for sign in signs}
+    limits = {foot: one_of(FAST, rng) if limit in FAST else limit for foot, limit in posts.items()}
+    return tuple(replace(sign, limit=limits[sign.stands_at]) for sign in signs)
 
 
 def one_of(options: Sequence[T], rng: np.random.Generator) -> T:

@@ -81,10 +81,11 @@ def build_scenery(roads: RoadNetwork, signs: Sequence[Sign], appearance: Appeara
 
 
 def _posts(roads: RoadNetwork, signs: Sequence[Sign]) -> Iterator[Prop]:
-    for post in roads.posts:
-        yield Prop("light_post", post.pose, length=0.2, width=0.2, height=3.5)
-    for sign in signs:
-        yield Prop("sign_post", sign.pose, length=0.2, width=0.2, height=2.5, limit=sign.limit)
+    """One post for all lanes of an approach."""
+    for foot in dict.fromkeys(post.stands_at for post in roads.posts):
+        yield Prop("light_post", foot, length=0.2, width=0.2, height=3.5)
+    for foot, limit in {sign.stands_at: sign.limit for sign in signs}.items():
+        yield Prop("sign_post", foot, length=0.2, width=0.2, height=2.5, limit=limit)
 
 
 def _plots(roads: RoadNetwork, layout: StreetLayout, rng: np.random.Generator) -> tuple[Points, Floats, Floats]:

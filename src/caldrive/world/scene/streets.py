@@ -11,7 +11,10 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.geometry import Polyline, moved, points_to_segments
+from caldrive.world.roads.levels import crossings
 from caldrive.world.roads.network import Lane, RoadNetwork
+
+GAP = 0.5  # m around a place where roads run above each other, without markings
 
 
 class Border(IntEnum):
@@ -39,27 +42,31 @@ class LaneChain:
 
 
 def lane_chains(roads: RoadNetwork) -> list[LaneChain]:
-    """All streets of a town; places where only the limit changes do not break them."""
+    """All streets of a town; places where only the limit changes do not break them, but those do where a street runs
+    above or below another."""
     lanes, posts = roads.lanes, {post.lane for post in roads.posts}
     inside = _inside_junctions(lanes)
     painted = [lane for lane in lanes.values() if lane.id not in inside]
-    continued = {_following(lane, inside) for lane in painted}
+    continued = {_following(lane, inside, posts) for lane in painted}
     starts = [lane for lane in painted if lane.id not in continued]
     neighbours, seen, chains = _LaneSegments(roads.driveable), set[str](), []
+    gaps = crossings(roads).buffer(GAP)
     for first in [*starts, *painted]:  # the second turn takes up closed rings, which have no start
-        parts = _walk(first, lanes, inside, seen)
+        parts = _walk(first, lanes, inside, posts, seen)
         if parts:
             points = shapely.LineString(np.concatenate([lane.line.points for lane in parts])).simplify(0.02)
             longest = max(parts, key=lambda lane: lane.line.length)
-            chains.append(
+            pieces = [part for part in shapely.get_parts(points.difference(gaps)) if part.length > GAP]
+            chains += [
                 LaneChain(
-                    line=Polyline(shapely.get_coordinates(points)),
+                    line=Polyline(shapely.get_coordinates(piece)),
                     width=longest.width,
                     left=neighbours.border(longest, side=1),
                     right=neighbours.border(longest, side=-1),
-                    stop=parts[-1].id in posts,
+                    stop=parts[-1].id in posts and piece is pieces[-1],
                 )
-            )
+                for piece in pieces
+            ]
     return chains
 
 
@@ -74,19 +81,21 @@ def _inside_junctions(lanes: dict[str, Lane]) -> set[str]:
     return inside
 
 
-def _following(lane: Lane, inside: set[str]) -> str | None:
-    """The one lane that a lane runs on into, or None at a junction or fork."""
-    return lane.successors[0] if len(lane.successors) == 1 and lane.successors[0] not in inside else None
+def _following(lane: Lane, inside: set[str], posts: set[str]) -> str | None:
+    """The one lane that a lane runs on into, or None at a junction, a fork or a stop line."""
+    if len(lane.successors) != 1 or lane.successors[0] in inside or lane.id in posts:
+        return None
+    return lane.successors[0]
 
 
-def _walk(first: Lane, lanes: dict[str, Lane], inside: set[str], seen: set[str]) -> list[Lane]:
+def _walk(first: Lane, lanes: dict[str, Lane], inside: set[str], posts: set[str], seen: set[str]) -> list[Lane]:
     """Lanes from the first to the end of its street, up to one seen before."""
     parts: list[Lane] = []
     id: str | None = first.id
     while id is not None and id not in seen:
         seen.add(id)
         parts.append(lanes[id])
-        id = _following(lanes[id], inside)
+        id = _following(lanes[id], inside, posts)
     return parts
 
 

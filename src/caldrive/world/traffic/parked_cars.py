@@ -79,6 +79,11 @@ class ParkedCar:
         pose = moved(self.lane.line.pose_at(self.s + self.way), left=left, turn=turn)
         return VehicleState(pose, self.speed, length=self.length, width=self.width, id=self.name)
 
+    @property
+    def height(self) -> float:
+        """Of the road, m."""
+        return self.lane.height(self.s + self.way)
+
 
 def room_to_stop(speed: float) -> float:
     """m that a driver needs who brakes at once."""

@@ -64,11 +64,13 @@ def _order_after(k: int, n: int) -> list[int]:
 
 
 class JunctionLights:
-    """The lights of one junction. posts: its approaches in the order of their turns."""
+    """The lights of one junction. posts: those of its approaches, in the order of their turns; lanes side by side have
+    the same turn."""
 
-    def __init__(self, posts: tuple[LightPost, ...], phase: Phase) -> None:
-        self.posts = posts
-        self.change(phase)
+    def __init__(self, posts: tuple[LightPost, ...], rng: np.random.Generator) -> None:
+        names = list(dict.fromkeys(post.approach for post in posts))
+        self.posts, self.approaches = posts, [names.index(post.approach) for post in posts]
+        self.change(_first_phase(len(names), rng))
 
     def change(self, phase: Phase) -> None:
         """Shows a phase; lights stay the same objects as long as it lasts."""
@@ -80,7 +82,14 @@ class JunctionLights:
 
     def states(self) -> list[LightState]:
         """What each post shows."""
-        return [self.phase.state if i == self.phase.approach else LightState.RED for i in range(len(self.posts))]
+        return [self.phase.state if k == self.phase.approach else LightState.RED for k in self.approaches]
+
+    def waiting(self, at_posts: list[bool]) -> list[bool]:
+        """Whether somebody waits in each approach, from whether somebody does at each post."""
+        waiting = [False] * (max(self.approaches) + 1)
+        for k, waits in zip(self.approaches, at_posts, strict=True):
+            waiting[k] |= waits
+        return waiting
 
 
 class _LoopDetectors:
@@ -134,9 +143,7 @@ class TrafficLights:
         grouped: dict[str, list[LightPost]] = defaultdict(list)
         for post in roads.posts:
             grouped[post.light].append(post)
-        self.junctions = {
-            name: JunctionLights(tuple(posts), _first_phase(len(posts), rng)) for name, posts in sorted(grouped.items())
-        }
+        self.junctions = {name: JunctionLights(tuple(posts), rng) for name, posts in sorted(grouped.items())}
         self._detectors = _LoopDetectors(self.junctions.values()) if self.junctions else None
         self.rng, self.demand, self._time = rng, demand, 0.0
         self._unseen = np.zeros(sum(len(junction.posts) for junction in self.junctions.values()), dtype=bool)
@@ -154,7 +161,7 @@ class TrafficLights:
         first, waits = 0, waiting.tolist()
         for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
             last = first + len(junction.posts)
-            phase = next_phase(junction.phase, time, waits[first:last], busy)
+            phase = next_phase(junction.phase, time, junction.waiting(waits[first:last]), busy)
             if phase is not junction.phase:
                 junction.change(phase)
             first = last

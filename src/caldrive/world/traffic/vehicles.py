@@ -30,7 +30,7 @@ from caldrive.world.traffic.sumo_process import (
 from caldrive.world.traffic.traffic_lights import TrafficLights
 
 EGO = "ego"
-POSITION, ANGLE, SPEED = 0x42, 0x43, 0x40  # numbers that libsumo has for what it can be asked
+POSITION, PLACE, ANGLE, SPEED = 0x42, 0x39, 0x43, 0x40  # numbers that libsumo has for what it can be asked
 LONGEST_WAIT = 60.0  # s until a car that is stuck is moved elsewhere
 OUT_OF_SIGHT, BESIDE = 70.0, 25.0  # m from the ego, where its camera looks and elsewhere
 LONGEST_WAY, LAST_EDGES = 30, 6  # edges of a random way, and how many of it are left when it gets a new one
@@ -41,8 +41,9 @@ CHECK_EVERY = 20  # steps, from one look after cars that are stuck or near the e
 class Traffic:
     """One SUMO simulation of n cars; there can be one in a process, until its `release`.
 
-    cars: all but the ego, as of the last step. Raises ValueError for more cars than the town holds, RuntimeError where
-    another simulation is under way.
+    cars: all but the ego, as of the last step; heights: of the roads under them (m), by their ids, where roads run
+    above each other. Raises ValueError for more cars than the town holds, RuntimeError where another simulation is
+    under way.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class Traffic:
         self.roads, self.rng, self.dt = roads, np.random.default_rng(seed), dt
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
         starts = self._random_places(n, ego)
+        self.heights: dict[str, float] = {}
         self._capped: set[str] = set()  # cars that are told how fast they may drive
         self._incidents = Incidents(self.rng)
         self._braking: str | None = None  # who brakes harder than others may
@@ -189,8 +191,10 @@ class Traffic:
         new = [name for name in names if name not in watched and name != EGO]
         if new:
             for name in new:
-                libsumo.vehicle.subscribe(name, (POSITION, ANGLE, SPEED))
+                libsumo.vehicle.subscribe(name, (POSITION, ANGLE, SPEED, *([] if self.roads.is_flat else [PLACE])))
             watched = libsumo.vehicle.getAllSubscriptionResults()
+        if not self.roads.is_flat:
+            self.heights = {name: float(watched[name][PLACE][2]) for name in names if name != EGO}
         return tuple(self._state(name, watched[name]) for name in names if name != EGO)
 
     def _state(self, name: str, values: Mapping[int, Any]) -> VehicleState:

@@ -15,6 +15,7 @@ from caldrive.datatypes import (
     CameraConfig,
     Contact,
     PedestrianState,
+    Points,
     Pose,
     TrafficLight,
     Truth,
@@ -22,6 +23,7 @@ from caldrive.datatypes import (
 )
 from caldrive.geometry import moved, positions
 from caldrive.scenarios import Scenario
+from caldrive.world.roads.levels import RouteLevel
 from caldrive.world.roads.route import Route
 from caldrive.world.town import Town
 from caldrive.world.truth.labels import label
@@ -48,7 +50,7 @@ class WorldState:
 
 
 class LabelRig:
-    """Labels along an episode's route through a town.
+    """Labels along an episode's route through a town. level: the route's, None where no road runs above another.
 
     front_axle: m from the ego's centre to its front axle. lights: the town's, in the order of every `WorldState`.
     """
@@ -57,8 +59,11 @@ class LabelRig:
         self, town: Town, route: Route, scenario: Scenario, front_axle: float, lights: Sequence[TrafficLight]
     ) -> None:
         self.town, self.route, self.scenario, self.front_axle = town, route, scenario, front_axle
-        self._limits = town.limits_along(route)
+        self.level = None if town.roads.is_flat else RouteLevel(town.roads, route)
+        self._limits = town.limits_along(route, self.level)
         self._posts = [positions(lights), positions(town.signs)]
+        of_posts = {post.id: post.height for post in town.roads.posts}
+        self._heights = [[of_posts[light.id] for light in lights], [sign.height for sign in town.signs]]
         self._near: tuple[Pose, list[list[int]]] | None = None  # where it was last looked for posts, and those found
 
     @cached_property
@@ -84,8 +89,14 @@ class LabelRig:
         if self._near is None or math.hypot(here.x - self._near[0].x, here.y - self._near[0].y) > MARGIN:
             square = IN_REACH + MARGIN
             away = [np.abs(posts - (here.x, here.y)).max(axis=1, initial=0.0) for posts in self._posts]
-            self._near = here, [np.flatnonzero(distances < square).tolist() for distances in away]
+            near = [np.flatnonzero(distances < square).tolist() for distances in away]
+            self._near = here, [self._on_level(*kind) for kind in zip(near, self._posts, self._heights, strict=True)]
         return self._near[1]
+
+    def _on_level(self, chosen: list[int], posts: Points, heights: Sequence[float]) -> list[int]:
+        """Those of some posts that are not on a bridge over the route, or below it."""
+        level = self.level
+        return [i for i in chosen if level is None or level.holds(float(posts[i, 0]), float(posts[i, 1]), heights[i])]
 
     def label_at(self, mount: CameraConfig, state: WorldState) -> Affordances:
         """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
