@@ -1,8 +1,8 @@
 """The task blocks of a finished network when driving, as one compiled loop over their weights.
 
 A frame passes 1.2 million weights and each of them once to three times, so that the time goes into fetching them: in
-bfloat16 they are half as many bytes as in 32 bits, and two thirds of the time are saved (one frame of the network that
-ships, weights not in the cache: 0.5 ms, through OpenVINO 1.1 ms, on an AMD EPYC with AVX2).
+bfloat16 they are half as many bytes as in 32 bits, and nearly half of the time is saved (one frame of the network that
+ships, weights not in the cache: 0.6 ms, through OpenVINO 1.0 ms, on an AMD EPYC with AVX2).
 """
 
 from __future__ import annotations
@@ -116,8 +116,7 @@ def _upper_halves(values: Floats) -> NDArray[np.uint16]:
 
 @compiled
 def _pass(history: Floats, group: Group, hidden: Floats, outputs: Floats) -> None:
-    """A group's outputs (K,) for features (span, F). hidden: room for the nodes' values (steps,
-    nodes)."""
+    """A group's outputs (K,) for features (span, F). hidden: room for the nodes' values (steps, nodes)."""
     hidden[...] = f32(0)
     for tap in range(group.weights.shape[0]):
         for step in range(hidden.shape[0]):
