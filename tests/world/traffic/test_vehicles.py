@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import libsumo
 import numpy as np
 import pytest
 from shapely import LineString
@@ -258,3 +259,17 @@ def test_more_cars_than_fit_are_refused_before_anything_grows_with_their_number(
     lights = TrafficLights(town02, np.random.default_rng(0))
     with pytest.raises(ValueError, match="found 1000000000000 cars asked for, but town02 has room for"):
         Traffic(town02, n=10**12, seed=0, dt=DT, ego=AWAY, lights=lights)
+
+
+def test_a_car_that_is_stuck_is_moved_elsewhere(town02: RoadNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
+    removed, remove = list[str](), libsumo.vehicle.remove
+
+    def note(name: str) -> None:
+        removed.append(name)
+        remove(name)
+
+    monkeypatch.setattr("caldrive.world.traffic.vehicles.LONGEST_WAIT", 1.0)
+    monkeypatch.setattr(libsumo.vehicle, "remove", note)
+    snapshots = drive(town02, 15, 30.0)
+    assert removed
+    assert {car.id for car in snapshots[-1].cars} == {f"car{k}" for k in range(15)}
