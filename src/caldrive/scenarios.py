@@ -3,15 +3,57 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import asdict, astuple, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from caldrive.datatypes import Pose
 from caldrive.files import as_type
 
 MOST_SEED = 2**53  # that JSON keeps exactly, as a number in 64 bits
-TOWNS = ("town01", "town02")  # in the package; others are OpenDRIVE files
+TOWNS = ("town01", "town02")  # in the package; others are generated, or OpenDRIVE files
+GENERATED = ("random", "random-wide")  # kinds of generated towns; random:7 is one
+HELD_OUT_FROM = 9_000_000  # seeds of generated towns that only judge: nothing is recorded, tuned or chosen there
 WEATHERS = range(1, 15)  # CARLA's
+
+
+class GeneratedTown(NamedTuple):
+    """A town that follows from a seed."""
+
+    kind: str
+    """One of GENERATED."""
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """As in a scenario."""
+        return f"{self.kind}:{self.seed}"
+
+    @property
+    def is_held_out(self) -> bool:
+        """Whether it is there to judge only."""
+        return self.seed >= HELD_OUT_FROM
+
+
+def generated_town(town: str) -> GeneratedTown | None:
+    """The generated town of a name such as random:7; None for a name of another form. Raises ValueError for a seed that
+    cannot be."""
+    kind, colon, seed = town.partition(":")
+    if kind not in GENERATED or not colon:
+        return None
+    if re.fullmatch(r"0|[1-9][0-9]{0,9}", seed, re.ASCII) is None:  # each town has one name
+        raise ValueError(f"found town {town!r}, wanted a seed from 0 to 9999999999: type --town {kind}:7")
+    return GeneratedTown(kind, int(seed))
+
+
+def require_not_held_out(town: str) -> None:
+    """Raises ValueError for a generated town that is there to judge only."""
+    generated = generated_town(town)
+    if generated is not None and generated.is_held_out:
+        raise ValueError(
+            f"found {town} to learn from, wanted a seed below {HELD_OUT_FROM}, as towns from there on only judge: "
+            f"type --town {generated.kind}:7"
+        )
 
 
 @dataclass(frozen=True)
@@ -19,7 +61,7 @@ class Scenario:
     """The conditions of one episode. Raises ValueError for values that cannot be."""
 
     town: str
-    """A town's name, or the path of an OpenDRIVE file."""
+    """A town's name, such as town01 or random:7, or the path of an OpenDRIVE file."""
     weather: int
     """One of CARLA's weathers, 1 to 14."""
     start: Pose

@@ -193,3 +193,9 @@ def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
     monkeypatch.setattr(collection, "_record", _dies_once)
     list(collect(TINY, tmp_path, workers=2))
     assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_town_that_only_judges_is_not_recorded(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"found random:9000000 to learn from, wanted a seed below 9000000"):
+        next(collect(replace(TINY, town="random:9000000"), tmp_path / "out"))
+    assert not (tmp_path / "out").exists()

@@ -23,7 +23,8 @@ from caldrive.benchmark.suites import SUITES, Trial, TrialResult, from_json, sui
 from caldrive.files import read_json, write_whole
 from caldrive.provenance import code_version, machine_name
 from caldrive.results import result_from_values
-from caldrive.scenarios import TOWNS
+from caldrive.scenarios import TOWNS, generated_town
+from caldrive.world.roads.towns import load_roads
 
 RUN = "run.json"
 
@@ -71,9 +72,10 @@ def driver_provenance(driver: AgentSettings) -> dict[str, Any]:
 
 
 def suite_digest(path: Path, trials: Sequence[Trial]) -> str:
-    """A digest of a suite of one's own: of its file, and of the maps that its trials drive in."""
+    """A digest of a suite of one's own: of its file, and of the maps and generated towns that its trials drive in."""
     maps = sorted({trial.scenario.town for trial in trials} - set(TOWNS))
-    content = b"".join(part.read_bytes() for part in (path, *map(Path, maps)))
+    files = (load_roads(town).network if generated_town(town) else Path(town) for town in maps)
+    content = b"".join(part.read_bytes() for part in (path, *files))
     return hashlib.sha256(content).hexdigest()[:16]
 
 

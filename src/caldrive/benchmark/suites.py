@@ -2,6 +2,7 @@
 
 The conditions are those of the paper's tables: the training town and weathers, new weathers, the new town, and both.
 CoRL-2017's new weathers are 4 and 14, NoCrash's 10 and 14 (driving-benchmarks, `corl_2017.py` and `carla100`).
+Suites of generated towns have one condition each.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
+from caldrive.benchmark.generated_suites import GENERATED_SUITES, generated_scenarios
 from caldrive.driving.rules import RULES
 from caldrive.driving.tasks import ROUTES_PER_TASK, TASKS, USUAL_TRAFFIC, task_scenarios
 from caldrive.files import read_json
@@ -152,6 +155,12 @@ def _nocrash_suite(fatal: tuple[InfractionKind, ...]) -> Callable[[int, str], li
     return trials
 
 
+def _generated(name: str, seed: int, time_limit: str) -> list[Trial]:
+    """A suite of generated towns, which is one condition, by our own strict rules."""
+    scenarios = generated_scenarios(name, seed, time_limit)
+    return [Trial(key, name, scenario, rules="strict") for key, scenario in scenarios]
+
+
 SUITES: Mapping[str, Callable[[int, str], list[Trial]]] = {  # by name; of a seed and a kind of time limit
     "corl2017": lambda seed, time_limit: list(_corl2017(seed, time_limit)),
     "corl2017-once": _corl2017_once,
@@ -159,6 +168,7 @@ SUITES: Mapping[str, Callable[[int, str], list[Trial]]] = {  # by name; of a see
     "nocrash": _nocrash_suite(COLLISIONS),
     "traffic-school": _nocrash_suite(TRAFFIC_RULES),
     "quick": _quick,
+    **{name: partial(_generated, name) for name in GENERATED_SUITES},
 }
 
 

@@ -25,6 +25,7 @@ from caldrive.provenance import code_version
 from caldrive.recordings.folder import Manifest, read_manifest
 from caldrive.recordings.reader import read_episode
 from caldrive.recordings.writer import FORMAT_VERSION, MANIFEST, EpisodeError, episode_path
+from caldrive.scenarios import require_not_held_out
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
 from caldrive.world.traffic import sidewalks, start_places
@@ -98,6 +99,7 @@ def _check(config: CollectConfig, workers: int) -> None:
         raise ValueError("found no weather in --weathers, wanted one or more: type --weathers 1 8 3 1 8 6")
     for number in config.weathers:
         weather(number)
+    require_not_held_out(config.town)
     roads = load_roads(config.town)
     room = {"cars": (0, start_places.room(roads)), "people": (0, sidewalks.room(roads))}
     require_limits(values, room, {name: min(most, usual[name]) for name, (_, most) in room.items()})

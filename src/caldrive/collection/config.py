@@ -10,7 +10,8 @@ class CollectConfig:
     """Record episodes that the oracle drives; what is there already is kept."""
 
     town: str = "town01"
-    """town01 for training; town02 is for evaluation only."""
+    """town01 for training, or a generated town such as random:7; town02 is for evaluation only, and so are generated
+    towns with seeds from 9,000,000 on."""
     weathers: tuple[int, ...] = (1, 8, 3, 1, 8, 6)
     """The weathers, in turn. Clear noon has the hardest shadows, and at clear sunset most is lost at junctions: both
     come twice as often."""

@@ -17,7 +17,7 @@ class Town(Output):
     """Draw a town: a contact sheet, or a plan to choose places from."""
 
     town: str = "town01"
-    """town01, town02 or an OpenDRIVE file."""
+    """town01, town02, random:SEED, random-wide:SEED or an OpenDRIVE file."""
     sheet: Path | None = None
     """A PNG file for camera images of the town in all weathers; out/town.png where no --plan is asked for."""
     plan: Path | None = None

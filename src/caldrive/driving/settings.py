@@ -18,7 +18,7 @@ class EpisodeSettings(AgentSettings):
     world: str = "embedded"
     """Where the agent drives: embedded, or your own: package.module:Class or file.py:Class."""
     town: str = "town01"
-    """town01, town02 or an OpenDRIVE file."""
+    """town01, town02, random:SEED, random-wide:SEED or an OpenDRIVE file."""
     task: str = "navigation"
     """straight, one-turn, navigation or navigation-dynamic."""
     weather: int = 1
@@ -67,7 +67,7 @@ class WorldSpeedSettings:
     """Camera steps a second in one process at 200 x 88, and which part takes how long."""
 
     town: str = "town01"
-    """town01, town02 or an OpenDRIVE file."""
+    """town01, town02, random:SEED, random-wide:SEED or an OpenDRIVE file."""
     weather: int = 1
     """One of CARLA's weathers, 1 to 14."""
     cars: int = 20

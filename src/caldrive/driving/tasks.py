@@ -18,7 +18,7 @@ import numpy as np
 
 from caldrive.datatypes import KMH, Command, Pose
 from caldrive.geometry import wrap_angle
-from caldrive.scenarios import TOWNS, Scenario
+from caldrive.scenarios import TOWNS, Scenario, generated_town
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route, plan_route
 from caldrive.world.roads.towns import load_roads
@@ -31,7 +31,8 @@ TIME_LIMITS = {  # km/h at which the path has to be driven, and s beside
 }
 ROUTES_PER_TASK = 25
 USUAL_TRAFFIC = {"town01": (20, 50), "town02": (15, 50)}  # cars and people of the dynamic task
-OTHER_TOWNS_TRAFFIC = (20, 50)
+MAPS_TRAFFIC = (20, 50)  # on maps of one's own
+TOWN01_ROADS = 4432.5  # m, to which the traffic of a generated town is scaled
 _DATA = Path(__file__).with_name("routes.json")
 # m kept between a start, or a goal, and the end of its lane, and between either and the start of its lane
 _START_BEFORE_END, _GOAL_BEFORE_END, _AFTER_START = 25.0, 5.0, 6.0
@@ -39,8 +40,9 @@ _START_BEFORE_END, _GOAL_BEFORE_END, _AFTER_START = 25.0, 5.0, 6.0
 _LENGTHS = {"straight": (90.0, 300.0), "one-turn": (130.0, 420.0), "navigation": (400.0, 1000.0)}
 _FULL_DIAGONAL = 520.0  # m, town01's
 _MAX_BEND = 0.2  # rad between the ends of a straight route
-_TRIES = 200  # for each route to draw
+_TRIES, _FEWEST_TRIES = 200, 1000  # for each route to draw, and in all
 _NOCRASH_OWN = {"town01": 5, "town02": 0}  # routes of NoCrash that are none of the navigation's
+_CUT_CORNER = 0.15  # rad, more than the first and the last metre of a lane turn
 
 
 def _fits(route: Route, task: str) -> bool:
@@ -48,6 +50,13 @@ def _fits(route: Route, task: str) -> bool:
     turns = sum(turn.command is not Command.STRAIGHT for turn in route.turns)
     bends = abs(wrap_angle(route.line.heading_at(0) - route.line.heading_at(route.length))) > _MAX_BEND
     return {"straight": turns == 0 and not bends, "one-turn": turns == 1, "navigation": turns >= 2}[task]
+
+
+def _may_fit(start: Pose, goal: Pose, task: str, longest: float) -> bool:
+    """Whether a route of a task, at most so many metres long, may lead from a start to a goal: quicker than to plan
+    it."""
+    turns = abs(wrap_angle(start.heading - goal.heading)) > _MAX_BEND + _CUT_CORNER
+    return math.hypot(goal.x - start.x, goal.y - start.y) <= longest and not (task == "straight" and turns)
 
 
 def _random_pose(roads: RoadNetwork, before_end: float, rng: np.random.Generator) -> Pose:
@@ -72,9 +81,9 @@ def draw_routes(roads: RoadNetwork, task: str, n: int, rng: np.random.Generator)
     scale = min(1.0, math.hypot(x1 - x0, y1 - y0) / _FULL_DIAGONAL)
     low, high = (scale * length for length in _LENGTHS[task])
     pairs: list[tuple[Pose, Pose]] = []
-    for _ in range(_TRIES * n):
+    for _ in range(max(_FEWEST_TRIES, _TRIES * n)):
         start, goal = _random_pose(roads, _START_BEFORE_END, rng), _random_pose(roads, _GOAL_BEFORE_END, rng)
-        if math.hypot(goal.x - start.x, goal.y - start.y) > high:  # no way is shorter than the beeline
+        if not _may_fit(start, goal, task, high):
             continue
         try:
             route = plan_route(roads, start, goal)
@@ -113,11 +122,31 @@ def routes(town: str, task: str, seed: int = 0) -> list[tuple[Pose, Pose]]:
     return draw_routes(load_roads(town), kind, ROUTES_PER_TASK, np.random.default_rng(seed))
 
 
+def scaled_traffic(road_length: float) -> tuple[int, int]:
+    """Cars and people on so many metres of streets, as dense as in town01."""
+    cars, people = (round(n * road_length / TOWN01_ROADS) for n in USUAL_TRAFFIC["town01"])
+    return cars, people
+
+
+def usual_traffic(town: str) -> tuple[int, int]:
+    """Cars and people of the dynamic task in a town."""
+    if generated_town(town):
+        return scaled_traffic(load_roads(town).road_length)
+    return USUAL_TRAFFIC.get(town, MAPS_TRAFFIC)
+
+
 @lru_cache(maxsize=4096)  # the same in all weathers
 def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
     """Seconds. kind: a name in TIME_LIMITS."""
+    return time_limit_of(plan_route(load_roads(town), start, goal).length, kind)
+
+
+def time_limit_of(length: float, kind: str) -> float:
+    """Seconds for a route of a length in m. kind: a name in TIME_LIMITS. Raises ValueError for another."""
+    if kind not in TIME_LIMITS:
+        raise ValueError(f"found time limit {kind!r}, wanted paper or code: type --time-limit paper")
     speed, beside = TIME_LIMITS[kind]
-    return plan_route(load_roads(town), start, goal).length / (speed * KMH) + beside
+    return length / (speed * KMH) + beside
 
 
 def task_scenarios(
@@ -133,13 +162,12 @@ def task_scenarios(
 ) -> list[Scenario]:
     """The 25 scenarios of a task, fewer on a map that has not so many routes for it.
 
-    cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02).
+    cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02); in
+    generated towns as many for their roads as in town01.
     task: `nocrash` has that benchmark's routes. time_limit: a name in TIME_LIMITS. name: the scenarios' task,
     where it is called something else. Raises ValueError for an unknown task or time limit.
     """
-    if time_limit not in TIME_LIMITS:
-        raise ValueError(f"found time limit {time_limit!r}, wanted paper or code: type --time-limit paper")
-    usual = USUAL_TRAFFIC.get(town, OTHER_TOWNS_TRAFFIC) if task == "navigation-dynamic" else (0, 0)
+    usual = usual_traffic(town) if task == "navigation-dynamic" else (0, 0)
     return [
         Scenario(
             town=town, weather=weather, start=start, goal=goal, n_vehicles=usual[0] if cars is None else cars,

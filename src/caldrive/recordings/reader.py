@@ -33,7 +33,7 @@ from caldrive.recordings.writer import (
     EpisodeError,
     Frame,
 )
-from caldrive.scenarios import TOWNS, WEATHERS, Scenario, scenario_from_values
+from caldrive.scenarios import TOWNS, WEATHERS, Scenario, generated_town, scenario_from_values
 
 RANGES = {  # of what a recorder writes, or nearly: no car drives 100 m/s, and no camera is 10 m beside it
     **{spec.name: (spec.low, spec.high) for spec in CONTINUOUS},
@@ -205,9 +205,14 @@ def _check_scenario(path: Path, scenario: Scenario) -> None:
         raise EpisodeError(
             f"{path} has weather {scenario.weather}, {WEATHERS[0]} to {WEATHERS[-1]} can be: remove it and record again"
         )
-    if scenario.town not in TOWNS and Path(scenario.town).suffix != ".xodr":
+    try:
+        is_known = scenario.town in TOWNS or generated_town(scenario.town) or Path(scenario.town).suffix == ".xodr"
+    except ValueError:  # a seed that cannot be
+        is_known = False
+    if not is_known:
         raise EpisodeError(
-            f"{path} has town {scenario.town!r}, {', '.join(TOWNS)} or a map (.xodr) can be: remove it and record again"
+            f"{path} has town {scenario.town!r}, {', '.join(TOWNS)}, random:SEED or a map (.xodr) can be: "
+            "remove it and record again"
         )
 
 

@@ -16,6 +16,7 @@ from caldrive.world.roads.route import Route
 from caldrive.world.roads.towns import load_roads, one_sentence
 from caldrive.world.scene.appearance import Appearance
 from caldrive.world.scene.domain_randomisation import town_appearance, town_signs
+from caldrive.world.scene.generated_appearance import own_appearance
 from caldrive.world.scene.scenery import Prop, build_scenery
 from caldrive.world.traffic.collisions import Obstacle, half_diagonal
 from caldrive.world.truth.ground_raster import GroundRaster
@@ -62,7 +63,7 @@ class Town:
     """Everything in a town that stands still."""
 
     name: str
-    """As in a scenario: a name or the path of an OpenDRIVE file."""
+    """As in a scenario: a name, or the path of an OpenDRIVE file."""
     appearance: Appearance
     """Its number is 0 for the town's own, else that of a random one."""
     roads: RoadNetwork
@@ -93,13 +94,14 @@ def _ground(roads: RoadNetwork) -> GroundRaster:
 
 @lru_cache(maxsize=2)
 def load_town(name: str, appearance: int = 0) -> Town:
-    """A town by name or OpenDRIVE file. appearance: the number of a random appearance (domain randomisation: other
-    houses, trees, colours, sun, limits of the fast streets), 0 for the town's own.
+    """A town by name, by seed or by OpenDRIVE file. appearance: the number of a random appearance (domain
+    randomisation: other houses, trees, colours, sun, limits of the fast streets), 0 for the town's own.
 
     Raises ValueError or FileNotFoundError where there is none.
     """
     roads = load_roads(name)
-    look, signs = town_appearance(roads.appearance, appearance), town_signs(roads.signs, appearance)
+    look = town_appearance(roads.appearance, appearance) if appearance else own_appearance(roads.appearance)
+    signs = town_signs(roads.signs, appearance)
     with one_sentence(name):
         scenery = build_scenery(roads, signs, look)
         return Town(

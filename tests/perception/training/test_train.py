@@ -17,7 +17,7 @@ from caldrive.perception.training.config import TRAININGS, TrainingConfig
 from caldrive.perception.training.train import _read_frames, train
 from caldrive.recordings.folder import find_episodes, split
 from caldrive.recordings.writer import EpisodeError
-from tests.perception.data import HEIGHT, HISTORY, SHORT, TINY, WIDTH, record
+from tests.perception.data import HEIGHT, HISTORY, SCENARIO, SHORT, TINY, WIDTH, record
 
 
 def test_learns_where_the_column_stands(folder: Path, tmp_path: Path) -> None:
@@ -128,3 +128,10 @@ def test_without_an_episode_no_folder_is_made(tmp_path: Path) -> None:
     with pytest.raises(EpisodeError, match="caldrive collect"):
         train(SHORT, tmp_path / "none", tmp_path / "out", TINY)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_seen_in_a_town_that_only_judges_trains_nothing(tmp_path: Path) -> None:
+    data = record(tmp_path / "data", n_frames=8, scenario=replace(SCENARIO, town="random:9000000"))
+    with pytest.raises(ValueError, match=r"found random:9000000 to learn from, wanted a seed below 9000000"):
+        train(SHORT, data, tmp_path / "out", TINY)
+    assert not (tmp_path / "out").exists()

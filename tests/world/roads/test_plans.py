@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.world.roads import plans
-from caldrive.world.roads.plans import AFTER_JUNCTION, PLANS, Plan, limits, network_of, rounded
+from caldrive.world.roads.plan_network import network_of
+from caldrive.world.roads.plans import AFTER_JUNCTION, PLANS, Plan, limits, rounded
 from caldrive.world.roads.towns import load_roads
 
 STRETCH = st.floats(20.0, 400.0)

@@ -34,7 +34,9 @@ def test_a_town_is_loaded_once(town01: RoadNetwork) -> None:
 
 
 def test_an_unknown_town_names_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"found town 'Paris', wanted one of town01, town02 or an OpenDRIVE file"):
+    with pytest.raises(
+        ValueError, match=r"found town 'Paris', wanted one of town01, town02, random:SEED or an OpenDRIVE"
+    ):
         load_roads("Paris")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -136,6 +137,17 @@ def test_a_car_at_a_stop_line_turns_its_light_green(index: int, town02: RoadNetw
     lights, post = TrafficLights(town02, np.random.default_rng(1)), town02.posts[index]
     drive(lights, [waiting_car(post, town02)], 15)
     assert state_of(lights, post) is GREEN
+
+
+def test_who_waits_nearer_to_the_middle_than_others_does_not_keep_the_junction_red(town02: RoadNetwork) -> None:
+    light = town02.posts[0].light
+    near, *others = (post for post in town02.posts if post.light == light)
+    away = [moved(post.pose, forward=-30.0) for post in others]
+    lines = [((pose.x - 1.0, pose.y), (pose.x + 1.0, pose.y)) for pose in away]
+    far = [replace(post, pose=pose, stop_line=line) for post, pose, line in zip(others, away, lines, strict=True)]
+    lights = TrafficLights(replace(town02, posts=(near, *far)), np.random.default_rng(1))
+    shown = [states[0] for states in drive(lights, [waiting_car(near, town02)], 15)]
+    assert shown.index(GREEN) * DT < LONGEST_GREEN + YELLOW + SHORTEST_CLEARING + 1
 
 
 @pytest.mark.parametrize(("before", "turn"), [(40.0, 0.0), (4.0, 3.14)], ids=["far away", "driving away"])

@@ -31,6 +31,7 @@ from caldrive.perception.training.resume import restore_state, save_state
 from caldrive.perception.training.run import TrainingRun, start_run
 from caldrive.progress import Progress, silent
 from caldrive.recordings.folder import episode_paths, find_episodes, split
+from caldrive.scenarios import require_not_held_out
 
 RANGE_FRAMES = 512  # on which the ranges of 8 bits are found
 
@@ -72,8 +73,10 @@ def train(
 
 
 def _read_frames(config: TrainingConfig, network: NetworkConfig, data: Path | str) -> tuple[Frames, Frames]:
-    """The frames that train, and those that validate."""
+    """The frames that train, and those that validate. Raises ValueError for a town that may only judge."""
     episodes = find_episodes(data, semantic=config.loss_weights.segmentation > 0 or config.recolour.enabled)
+    for town in {episode.scenario.town for episode in episodes}:
+        require_not_held_out(town)
     training, validation = split(episodes, config.validation_share, config.seed)
     validation = [replace(episode, semantics=None) for episode in validation]  # only a loss looks at them
     return Frames(training, network.image_size, config.cache_gb), Frames(validation, network.image_size)

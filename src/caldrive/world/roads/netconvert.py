@@ -43,13 +43,14 @@ def netconvert_binary() -> Path:
         import sumo
     except ImportError:
         raise RuntimeError(
-            "found no netconvert, wanted it to read an OpenDRIVE map: type pip install 'caldrive[opendrive]'"
+            "found no netconvert, wanted it to make roads of a map or of a seed: type pip install 'caldrive[opendrive]'"
         ) from None
     return Path(sumo.SUMO_HOME) / "bin" / "netconvert"
 
 
 def run_netconvert(inputs: Mapping[str, bytes], options: Sequence[str] = ()) -> bytes:
-    """The network that netconvert makes. inputs: what is in the files that it reads, by the option that names each.
+    """The network that netconvert makes. inputs: what is in the files that it reads, by the option that names each;
+    options: more than the common ones, or in their place.
 
     Raises RuntimeError where it is not installed, ValueError with its reason where it makes none.
     """
@@ -58,12 +59,18 @@ def run_netconvert(inputs: Mapping[str, bytes], options: Sequence[str] = ()) -> 
         files = {option: stack.enter_context(memory_file(content)) for option, content in inputs.items()}
         network, said = stack.enter_context(memory_file()), stack.enter_context(memory_file())
         named = [f"--{option}={path_of(file)}" for option, file in files.items()]
-        command = [str(binary), *named, *options, *_COMMON, f"--output-file={path_of(network)}"]
+        command = [str(binary), *named, *options, *_but(options), f"--output-file={path_of(network)}"]
         code = _run(command, binary.parent.parent, [file.fileno() for file in (*files.values(), network)], said)
         if code != 0:
             raise ValueError(_reason(code, _content(said, MOST_SAID).decode(errors="replace")))
         # The header names the time and the command line: without it the same plan gives the same bytes.
         return re.sub(rb"<!--.*?-->\s*", b"", _content(network), flags=re.DOTALL)
+
+
+def _but(options: Sequence[str]) -> list[str]:
+    """The common options without those that are given: netconvert takes none twice."""
+    given = {option.partition("=")[0] for option in options}
+    return [option for option in _COMMON if option.partition("=")[0] not in given]
 
 
 def _run(command: Sequence[str], home: Path, files: Sequence[int], said: BinaryIO) -> int:

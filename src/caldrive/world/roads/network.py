@@ -64,9 +64,9 @@ class Lane:
         left, right = moved(end, left=self.width / 2), moved(end, left=-self.width / 2)
         return (left.x, left.y), (right.x, right.y)
 
-    def post_beside(self, s: float) -> Pose:
-        """Where a post stands on its right, s m along it, facing its traffic."""
-        return moved(self.line.pose_at(s), left=-(self.width / 2 + POST_BESIDE_LANE))
+    def post_beside(self, s: float, *, away: float = POST_BESIDE_LANE) -> Pose:
+        """Where a post stands on its right, s m along it and so many metres off, facing its traffic."""
+        return moved(self.line.pose_at(s), left=-(self.width / 2 + away))
 
 
 @dataclass(frozen=True)
@@ -165,6 +165,20 @@ class RoadNetwork:
         """Whether no road can run above another."""
         heights = [np.zeros(1) if lane.heights is None else lane.heights for lane in self.lanes.values()]
         return float(np.ptp(np.concatenate(heights))) < CLEARANCE
+
+    @cached_property
+    def road_length(self) -> float:
+        """m of all streets, each of its two ways counted, its lanes beside each other not."""
+        return sum({lane.edge: lane.line.length for lane in self.driveable}.values())
+
+    @cached_property
+    def predecessors(self) -> dict[str, list[str]]:
+        """The ids of the lanes that lead to each lane."""
+        before: dict[str, list[str]] = {id: [] for id in self.lanes}
+        for lane in self.lanes.values():
+            for successor in lane.successors:
+                before[successor].append(lane.id)
+        return before
 
     @cached_property
     def _boxes(self) -> NDArray[np.float64]:

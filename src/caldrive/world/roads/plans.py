@@ -1,20 +1,18 @@
-"""The plans of the package's own towns, and how they become SUMO networks.
+"""Plans of towns: junctions joined by streets. Those of the package's own towns stand here.
 
-A plan is a handful of T-junctions joined by streets. Limits follow one rule: 30 around junctions and corners, 60 where
-the free stretch allows it, 90 on the longest ones. `python -m caldrive.world.roads.plans` writes the shipped networks.
+Limits follow one rule: 30 around junctions and corners, 60 where the free stretch allows it, 90 on the longest ones.
+`python -m caldrive.world.roads.plans` writes the shipped networks.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from caldrive.datatypes import KMH, Points
+from caldrive.datatypes import Points
 from caldrive.files import write_whole
 
 LANE_WIDTH = 4.0  # m
@@ -32,6 +30,27 @@ class Street:
     end: str
     corners: tuple[tuple[float, float], ...] = ()
     """Points on the way, which are rounded, m."""
+    radius: float = CORNER_RADIUS
+    """m, of these corners."""
+    lanes: int = 1
+    """To either side."""
+
+    @property
+    def name(self) -> str:
+        """That of its junctions."""
+        return f"{self.start}{self.end}"
+
+
+@dataclass(frozen=True)
+class Roundabout:
+    """A one-way ring, driven counter-clockwise. The light lets the streets in one after the other."""
+
+    center: tuple[float, float]
+    """m."""
+    radius: float
+    """m, of the lane's middle."""
+    junctions: tuple[str, ...]
+    """Where streets meet the ring, counter-clockwise."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +61,13 @@ class Plan:
     junctions: dict[str, tuple[float, float]]
     """Their middles (m) by their names."""
     streets: tuple[Street, ...]
+    lane_width: float = LANE_WIDTH
+    """m."""
+    grain: float = 1.0
+    """m from one point of a bend to the next, at most."""
+    roundabouts: tuple[Roundabout, ...] = ()
+    unlit: frozenset[str] = frozenset()
+    """Junctions without lights."""
 
 
 TOWN01 = Plan(
@@ -72,9 +98,9 @@ TOWN02 = Plan(
 PLANS = {plan.name: plan for plan in (TOWN01, TOWN02)}
 
 
-def rounded(points: Points, radius: float) -> tuple[Points, list[tuple[float, float]]]:
+def rounded(points: Points, radius: float, grain: float = 1.0) -> tuple[Points, list[tuple[float, float]]]:
     """A polyline (N, 2) with its corners rounded by a radius in m, and the stretches (from, to) in m along it that
-    bend."""
+    bend. grain: m from one point of a bend to the next, at most."""
     line, bends, travelled = [points[0]], [], 0.0
     for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
         u, v = (p / np.linalg.norm(p) for p in (before - corner, after - corner))
@@ -86,7 +112,7 @@ def rounded(points: Points, radius: float) -> tuple[Points, list[tuple[float, fl
         travelled += float(np.linalg.norm(first - line[-1]))
         bends.append((travelled, travelled + radius * abs(sweep)))
         travelled = bends[-1][1]
-        for angle in np.linspace(0, sweep, max(2, math.ceil(radius * abs(sweep) / 1.0)) + 1):
+        for angle in np.linspace(0, sweep, max(2, math.ceil(radius * abs(sweep) / grain)) + 1):
             c, s = math.cos(angle), math.sin(angle)
             line.append(center + np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]]))
     return np.array([*line, points[-1]]), bends
@@ -111,61 +137,8 @@ def limits(length: float, bends: list[tuple[float, float]]) -> list[tuple[float,
     return profile
 
 
-def _limit_at(profile: list[tuple[float, int]], s: float) -> int:
-    return [limit for start, limit in profile if start <= s + 0.02][-1]
-
-
-def _cut(line: Points, start: float, end: float) -> Points:
-    """The part of a polyline between two arc lengths."""
-    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))))
-    inner = s[(s > start + 1e-6) & (s < end - 1e-6)]
-    at = np.concatenate(([start], inner, [end]))
-    return np.stack((np.interp(at, s, line[:, 0]), np.interp(at, s, line[:, 1])), axis=1)
-
-
-def _add_street(nodes: ET.Element, edges: ET.Element, plan: Plan, street: Street) -> None:
-    corners = [plan.junctions[street.start], *street.corners, plan.junctions[street.end]]
-    line, bends = rounded(np.array(corners, dtype=float), CORNER_RADIUS)
-    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-    ahead = limits(length, bends)
-    back = limits(length, [(length - end, length - begin) for begin, end in reversed(bends)])
-    cuts = sorted({round(s, 2) for s, _ in ahead} | {round(length - s, 2) for s, _ in back} | {0.0, round(length, 2)})
-    cuts = [c for i, c in enumerate(cuts) if i == 0 or c - cuts[i - 1] > 1.0]
-    cuts[-1] = length
-    name = f"{street.start}{street.end}"
-    ids = [street.start, *(f"{name}{i}" for i in range(1, len(cuts) - 1)), street.end]
-    for node, s in list(zip(ids, cuts, strict=True))[1:-1]:
-        x, y = _cut(line, 0, s)[-1]
-        ET.SubElement(nodes, "node", id=node, x=f"{x:.3f}", y=f"{y:.3f}", type="priority", radius="0.1")
-    for i, (start, end) in enumerate(itertools.pairwise(cuts)):
-        shape = _cut(line, start, end)
-        forward, backward = _limit_at(ahead, start), _limit_at(back, length - end)
-        _add_edge(edges, f"{name}{i}", ids[i], ids[i + 1], shape, forward)
-        _add_edge(edges, f"-{name}{i}", ids[i + 1], ids[i], shape[::-1], backward)
-
-
-def _add_edge(edges: ET.Element, name: str, start: str, end: str, shape: Points, limit: int) -> None:
-    ET.SubElement(
-        edges, "edge", {
-            "id": name, "from": start, "to": end, "numLanes": "1", "width": f"{LANE_WIDTH}",
-            "speed": f"{limit * KMH:.4f}", "shape": " ".join(f"{x:.3f},{y:.3f}" for x, y in shape),
-        },
-    )  # fmt: skip
-
-
-def network_of(plan: Plan) -> bytes:
-    """A plan as a SUMO network. Needs netconvert (the extra `opendrive`)."""
-    from caldrive.world.roads.netconvert import run_netconvert
-
-    nodes, edges = ET.Element("nodes"), ET.Element("edges")
-    for name, (x, y) in plan.junctions.items():
-        ET.SubElement(nodes, "node", id=name, x=str(x), y=str(y), type="traffic_light", radius="7")
-    for street in plan.streets:
-        _add_street(nodes, edges, plan, street)
-    inputs = {"node-files": ET.tostring(nodes), "edge-files": ET.tostring(edges)}
-    return run_netconvert(inputs, ["--offset.disable-normalization"])
-
-
 if __name__ == "__main__":
+    from caldrive.world.roads.plan_network import network_of
+
     for plan in PLANS.values():
         write_whole(Path(__file__).parent / "data" / f"{plan.name}.net.xml", network_of(plan))

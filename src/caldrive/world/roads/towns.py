@@ -1,4 +1,4 @@
-"""Towns by name or by OpenDRIVE file."""
+"""Towns by name, by seed or by OpenDRIVE file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from functools import lru_cache
 from multiprocessing import parent_process
 from pathlib import Path
 
-from caldrive.scenarios import TOWNS
+from caldrive.scenarios import TOWNS, generated_town
+from caldrive.world.roads.generated import load_generated
 from caldrive.world.roads.map_cache import digest, kept_network
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.sumo_reader import read_roads
@@ -22,15 +23,17 @@ _DATA = Path(__file__).parent / "data"
 
 @lru_cache(maxsize=4)
 def load_roads(town: str) -> RoadNetwork:
-    """The roads of `town01`, `town02` or an OpenDRIVE file. Raises ValueError, OSError, or RuntimeError where a map
-    needs what is not installed."""
+    """The roads of `town01`, `town02`, a generated town such as `random:7`, or an OpenDRIVE file. Raises ValueError,
+    OSError, or RuntimeError where a town needs what is not installed."""
     if town in TOWNS:
         return read_roads(town, _DATA / f"{town}.net.xml", appearance=town)
+    if generated := generated_town(town):
+        return load_generated(generated)
     path = Path(town)
     if path.suffix != ".xodr":
         raise ValueError(
-            f"found town {town!r}, wanted one of {', '.join(TOWNS)} or an OpenDRIVE file: "
-            "type --town town01 or --town FILE.xodr"
+            f"found town {town!r}, wanted one of {', '.join(TOWNS)}, random:SEED or an OpenDRIVE file: "
+            "type --town town01, --town random:7 or --town FILE.xodr"
         )
     if not path.is_file():
         raise FileNotFoundError(f"found no file {town}, wanted an OpenDRIVE map: check the path given to --town")
@@ -83,7 +86,7 @@ def one_sentence(town: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:  # no list of what XML, SUMO, numpy and shapely may raise would be complete
-        if town in TOWNS:
+        if town in TOWNS or generated_town(town):
             raise
         kind = "" if type(error) is ValueError else f"{type(error).__name__}: "
         raise ValueError(

@@ -31,6 +31,7 @@ from caldrive.world.scene.kerb_lines import (
     without_overlaps,
 )
 
+SHORTEST_BLOCK = 80.0  # m around it; on smaller ones, such as a roundabout's island, stands no house
 SETBACK = 1.4  # m from the sidewalk to a façade
 PUSHED_BACK = (0.0, 1.0, 2.5)  # m more where a bend leaves too little room
 HOUSE_CLEARANCE = 1.0  # m from the sidewalk that stay free of houses
@@ -92,6 +93,8 @@ def _plots(roads: RoadNetwork, layout: StreetLayout, rng: np.random.Generator) -
     """Middles (N, 2) of the plots' street sides, headings (N,) away from the road, and frontages (N,) in m."""
     parts = [(np.zeros((0, 2)), np.zeros(0), np.zeros(0))]  # a town may be too small for any
     for line in kerb_lines(roads, SIDEWALK_WIDTH + SETBACK):
+        if line.length < SHORTEST_BLOCK:
+            continue
         width = random_lengths(line.length, *layout.frontage, rng)
         parts.append((*chords(line, np.cumsum(width) - width / 2, width / 2), width))
     middles, outward, frontage = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

@@ -18,6 +18,7 @@ GRAIN = 0.05  # m between two rows of a table of places
 CROSSING_SPACING = 2.0  # m of kerb from one crossing to the next
 SHORTEST_CROSSING, LONGEST_CROSSING = 5.0, 22.0  # m
 SPACE_PER_PERSON = 3.0  # m of sidewalk
+LONGEST_ISLAND = 100.0  # m around an island in the road where nobody walks
 Floats = NDArray[np.float64]
 
 
@@ -70,7 +71,7 @@ class Sidewalks:
 @lru_cache(maxsize=8)
 def find_sidewalks(roads: RoadNetwork) -> Sidewalks:
     """The sidewalk loops of a town, and every other metre of kerb where one can cross."""
-    middle = roads.roadway.buffer(SIDEWALK_WIDTH / 2)
+    middle = _without_islands(roads.roadway.buffer(SIDEWALK_WIDTH / 2))
     loops = [ring.simplify(0.02) for ring in rings(middle)]
     tables = [_table(Polyline(shapely.get_coordinates(ring))) for ring in loops]
     shapely.prepare(middle)
@@ -83,6 +84,16 @@ def find_sidewalks(roads: RoadNetwork) -> Sidewalks:
             first=np.cumsum([0, *(len(table) for table in tables[:-1])]),
             grain=GRAIN,
         ),
+    )
+
+
+def _without_islands(area: shapely.Geometry) -> shapely.Geometry:
+    """An area without its small holes: nobody walks on the island of a roundabout."""
+    return shapely.MultiPolygon(
+        [
+            shapely.Polygon(part.exterior, [hole for hole in part.interiors if hole.length > LONGEST_ISLAND])
+            for part in shapely.get_parts(area)
+        ]
     )
 
 

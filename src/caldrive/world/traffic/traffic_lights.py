@@ -11,6 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,7 @@ class _LoopDetectors:
         self.stops = np.concatenate(groups)
         self.headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
         self.centers = np.array([stops.mean(0) for stops in groups])
+        self.ends = np.cumsum([len(stops) for stops in groups])
         self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
 
     def look(self, boxes: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -107,29 +109,57 @@ class _LoopDetectors:
         `geometry.boxes_of`."""
         waiting, occupied = np.zeros(len(self.headings), np.bool_), np.zeros(len(self.radii), np.bool_)
         _look(boxes, self.stops, self.headings, waiting)
-        _look_inside(boxes, self.centers, self.radii, occupied)
+        at = Junctions(self.centers, self.radii, self.ends, self.stops, self.headings)
+        _look_inside(boxes, at, occupied)
         return waiting, occupied
+
+
+class Junctions(NamedTuple):
+    """Where the junctions with lights are."""
+
+    centers: Points
+    """(J, 2)."""
+    radii: Points
+    """(J,) m from a centre to the farthest stop line."""
+    ends: NDArray[np.int64]
+    """(J,) behind each one's last post; the posts of a junction follow each other."""
+    stops: Points
+    """(P, 2) middles of the stop lines."""
+    headings: Points
+    """(P,) of who drives towards them."""
+
+
+@compiled
+def _waits(car: Points, stop: Points, heading: float) -> bool:
+    """Whether a car (3,) waits at a stop line (2,)."""
+    c, s = math.cos(heading), math.sin(heading)
+    dx, dy = car[0] - stop[0], car[1] - stop[1]
+    ahead, left = dx * c + dy * s, dy * c - dx * s
+    near = -LOOP - HALF_CAR < ahead < JUST_BEYOND and abs(left) < LOOP_HALF_WIDTH
+    return near and math.cos(car[2] - heading) > SAME_WAY
 
 
 @compiled
 def _look(boxes: Points, stops: Points, headings: Points, waiting: NDArray[np.bool_]) -> None:
     """Writes whether somebody (N, 3) waits at each post (P,), by the middles of the stop lines (P, 2)."""
     for post in range(len(stops)):
-        c, s = math.cos(headings[post]), math.sin(headings[post])
         for k in range(len(boxes)):
-            dx, dy = boxes[k, 0] - stops[post, 0], boxes[k, 1] - stops[post, 1]
-            ahead, left = dx * c + dy * s, dy * c - dx * s
-            if -LOOP - HALF_CAR < ahead < JUST_BEYOND and abs(left) < LOOP_HALF_WIDTH:
-                waiting[post] |= math.cos(boxes[k, 2] - headings[post]) > SAME_WAY
+            waiting[post] |= _waits(boxes[k], stops[post], headings[post])
 
 
 @compiled
-def _look_inside(boxes: Points, centers: Points, radii: Points, occupied: NDArray[np.bool_]) -> None:
-    """Writes whether somebody is inside each junction (J,)."""
-    for junction in range(len(centers)):
+def _look_inside(boxes: Points, at: Junctions, occupied: NDArray[np.bool_]) -> None:
+    """Writes whether somebody is inside each junction (J,); who waits at one of its stop lines is not, even if others
+    lie farther out."""
+    first = 0
+    for junction in range(len(at.centers)):
         for k in range(len(boxes)):
-            away = math.hypot(boxes[k, 0] - centers[junction, 0], boxes[k, 1] - centers[junction, 1])
-            occupied[junction] |= away < radii[junction] - INSIDE
+            away = math.hypot(boxes[k, 0] - at.centers[junction, 0], boxes[k, 1] - at.centers[junction, 1])
+            inside = away < at.radii[junction] - INSIDE
+            for post in range(first, at.ends[junction]):
+                inside = inside and not _waits(boxes[k], at.stops[post], at.headings[post])
+            occupied[junction] |= inside
+        first = at.ends[junction]
 
 
 class TrafficLights:

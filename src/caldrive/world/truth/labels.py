@@ -81,16 +81,16 @@ def red_light(axle: Pose, lights: Sequence[TrafficLight], speed: float) -> bool:
     """Whether a light that faces the ego and is not green stands in the area for this speed (m/s). Yellow counts, as it
     asks to stop."""
     inside = light_area(speed).among(axle, lights)
-    return any(light.state is not LightState.GREEN and _faces(light.pose, axle) for _, light in inside)
+    return any(light.state is not LightState.GREEN and faces(light.pose, axle) for _, light in inside)
 
 
 def speed_sign(axle: Pose, signs: Sequence[Sign]) -> int | None:
     """The limit on the nearest sign in A1 that faces the ego, in km/h."""
-    limits = [(ahead, sign.limit) for ahead, sign in A1.among(axle, signs) if _faces(sign.pose, axle)]
+    limits = [(ahead, sign.limit) for ahead, sign in A1.among(axle, signs) if faces(sign.pose, axle)]
     return min(limits)[1] if limits else None
 
 
-def _faces(post: Pose, axle: Pose) -> bool:
+def faces(post: Pose, axle: Pose) -> bool:
     """Whether what hangs on a post is meant for those who drive as the axle looks."""
     return abs(wrap_angle(post.heading - axle.heading)) <= FACING
 
