@@ -16,8 +16,8 @@ from caldrive import compiled
 PROGRAM = """
 import numpy as np
 from caldrive.geometry import boxes_of
-from caldrive.world.traffic.gap_acceptance import may_walk
-print(may_walk(np.zeros(2), (0.0, 1.0), 1.0, boxes_of([]), False))
+from caldrive.world.traffic.gap_acceptance import Cars, may_walk
+print(may_walk(np.zeros(2), (0.0, 1.0), 1.0, Cars(boxes_of([])), False))
 """
 
 

@@ -79,7 +79,7 @@ class Episode:
                     self._traffic.take_over(car.state, car.lane, car.s + car.way)
                 self._traffic.step(time, ego, before.pedestrians)
         with self._timed("pedestrians"):
-            self._pedestrians.step(DT, [ego, *before.vehicles])
+            self._pedestrians.step(DT, [ego, *before.vehicles], self._curvature())
         with self._timed("contacts"):
             contacts = self._resolve_contacts(before)
         here = self._ego.pose
@@ -104,6 +104,10 @@ class Episode:
     def _ego_box(self) -> VehicleState:
         size = self.vehicle
         return VehicleState(self._ego.pose, self._ego.speed, length=size.length, width=size.width, id="ego")
+
+    def _curvature(self) -> float:
+        """Of the ego's path, as its wheels stand, 1/m."""
+        return math.tan(self._ego.steer_angle) / self.vehicle.wheelbase
 
     def _resolve_contacts(self, before: WorldState) -> tuple[Contact, ...]:
         """Finds contacts, and lets them act on the ego."""

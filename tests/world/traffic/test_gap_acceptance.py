@@ -9,12 +9,14 @@ import pytest
 
 from caldrive.datatypes import Pose, VehicleState
 from caldrive.geometry import boxes_of
-from caldrive.world.traffic.gap_acceptance import bumps, may_walk
+from caldrive.world.traffic.gap_acceptance import Cars, bumps, is_clear, may_walk
 
 
-def may(car: VehicleState, x: float, y: float, dx: float, dy: float, pace: float = 1.2, bold: bool = False) -> bool:
+def may(
+    car: VehicleState, x: float, y: float, dx: float, dy: float, *, bold: bool = False, curvature: float = 0.0
+) -> bool:
     """Whether somebody at (x, y) may walk (dx, dy)."""
-    return bool(may_walk(np.array((x, y)), (dx, dy), pace, boxes_of([car]), bold))
+    return bool(may_walk(np.array((x, y)), (dx, dy), 1.2, Cars(boxes_of([car]), curvature), bold))
 
 
 def car(speed: float, heading: float = 0.0) -> VehicleState:
@@ -86,24 +88,74 @@ def test_the_bold_step_out_before_the_ego_as_soon_as_one_who_brakes_at_once_can_
 
 
 def test_the_bold_are_careful_with_others() -> None:
-    boxes = boxes_of([VehicleState(Pose(-1e4, 0, 0)), car(5.5)])
+    cars = Cars(boxes_of([VehicleState(Pose(-1e4, 0, 0)), car(5.5)]))
     place = np.array((2.1 + 6.0, -2.06))
-    assert not may_walk(place, (0.0, 0.2), 1.2, boxes, True)
-    assert may_walk(place, (0.0, 0.2), 1.2, boxes_of([car(5.5)]), True)
+    assert not may_walk(place, (0.0, 0.2), 1.2, cars, True)
+    assert may_walk(place, (0.0, 0.2), 1.2, Cars(boxes_of([car(5.5)])), True)
 
 
 @pytest.mark.parametrize(
     ("x", "y", "dx", "dy"), [(0.0, -1.4, 0.0, 0.14), (2.6, 0.0, -0.14, 0.0), (0.0, -1.3, 0.0, 0.14)]
 )
 def test_nobody_walks_into_a_standing_car(x: float, y: float, dx: float, dy: float) -> None:
-    boxes = boxes_of([car(0.0)])
-    assert bumps(np.array((x, y)), (dx, dy), boxes)
-    assert not bumps(np.array((x, y)), (-dx, -dy), boxes)
+    cars = Cars(boxes_of([car(0.0)]))
+    assert bumps(np.array((x, y)), (dx, dy), cars)
+    assert not bumps(np.array((x, y)), (-dx, -dy), cars)
 
 
 def test_nobody_steps_before_a_car_that_cannot_stop_any_more_and_who_is_there_goes_on() -> None:
-    boxes = boxes_of([car(5.5)])
+    cars = Cars(boxes_of([car(5.5)]))
     near, far, there = np.array((2.1 + 2.0, -1.4)), np.array((2.1 + 6.0, -1.4)), np.array((2.1 + 2.0, 0.5))
-    assert bumps(near, (0.0, 0.14), boxes)
-    assert not bumps(far, (0.0, 0.14), boxes)
-    assert not bumps(there, (0.0, 0.14), boxes)
+    assert bumps(near, (0.0, 0.14), cars)
+    assert not bumps(far, (0.0, 0.14), cars)
+    assert not bumps(there, (0.0, 0.14), cars)
+
+
+TURN = 1 / 8.0  # 1/m
+
+
+@pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
+def test_people_look_along_the_path_of_an_ego_that_turns(side: int) -> None:
+    def beside(angle: float, left: float) -> tuple[float, float]:
+        """A place so far along the path, and so many m left of it where it turns left."""
+        return (8.0 - left) * math.sin(angle), side * (8.0 - (8.0 - left) * math.cos(angle))
+
+    there, onto = beside(0.8, 2.1), beside(0.8, 1.8)
+    step = (onto[0] - there[0], onto[1] - there[1])
+    assert may(car(4.0), *there, *step)
+    assert not may(car(4.0), *there, *step, bold=True, curvature=side * TURN)
+    near, nearer = beside(0.45, 1.4), beside(0.45, 1.3)
+    step = (nearer[0] - near[0], nearer[1] - near[1])
+    assert not bumps(np.array(near), step, Cars(boxes_of([car(4.0)])))
+    assert bumps(np.array(near), step, Cars(boxes_of([car(4.0)]), side * TURN))
+
+
+def test_nobody_is_bold_before_an_ego_that_turns() -> None:
+    bold, careful = (
+        [x for x in np.arange(3.0, 14.0, 0.1) if may(car(5.5), x, -2.06, 0.0, 0.2, bold=bold, curvature=-0.025)]
+        for bold in (True, False)
+    )
+    assert bold == careful
+
+
+@pytest.mark.parametrize("curvature", [0.1, -0.1, 0.02])
+def test_a_curved_path_is_as_long_as_it_is(curvature: float) -> None:
+    """Who steps on a path may do so the same way ahead of the car on straight and curved ones."""
+
+    def nearest(bend: float) -> float:
+        for ahead in np.arange(3.0, 14.0, 0.1).tolist():
+            angle = ahead * bend
+            x, y = (math.sin(angle) / bend, (1 - math.cos(angle)) / bend) if bend else (ahead, 0.0)
+            u, v = math.cos(angle), math.sin(angle)
+            if may(car(3.0), x + 2.1 * v, y - 2.1 * u, -0.2 * v, 0.2 * u, curvature=bend):
+                return float(ahead)
+        return math.inf
+
+    assert nearest(curvature) == pytest.approx(nearest(0.0), abs=0.35)
+
+
+def test_a_way_across_is_clear_unless_a_car_stands_in_it() -> None:
+    far = VehicleState(Pose(-1e4, 0, 0))
+    for x, speed, free in ((0.0, 0.0, False), (2.6, 0.0, False), (6.0, 0.0, True), (0.0, 5.0, True)):
+        ways = np.array((x, -4.0)), np.array((x, 4.0))
+        assert is_clear(*ways, Cars(boxes_of([far, car(speed)]))) is free

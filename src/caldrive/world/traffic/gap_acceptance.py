@@ -6,6 +6,7 @@ of it as soon as a driver who brakes at once can just stop. So who looks can alw
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,28 +27,41 @@ REACTION, HARD_BRAKE, SPARE = 0.3, 6.5, 0.8
 EGO = 0  # its row among the boxes
 BODY, TOUCH = 1.35, 0.45  # m: half of a car and of a person beside it, and from its ends, with some room
 FULL_BRAKE, LEFT_OVER = 7.0, 0.3  # m/s² of a driver who brakes already, and m that remain
+STRAIGHT = 0.02  # 1/m: less curved paths are as good as straight
+STEPS_OVER = 0.4  # m from one look along a way to the next
 Floats = NDArray[np.float64]
 
 
+class Cars(NamedTuple):
+    """Whom people look out for."""
+
+    boxes: Floats
+    """(M, 5), see `geometry.boxes_of`; the ego first."""
+    curvature: float = 0.0
+    """1/m of the ego's path as its wheels stand, + to the left."""
+
+
 @compiled
-def may_walk(position: Points, way: tuple[float, float], pace: float, boxes: Floats, is_bold: bool) -> bool:
+def may_walk(position: Points, way: tuple[float, float], pace: float, cars: Cars, is_bold: bool) -> bool:
     """Whether somebody (2,) may walk a stretch (x, y in m) at a pace (m/s): who enters no corridor of a car that by
-    then is beside them or can neither stop nor pass. boxes: of the ego and the others, see `geometry.boxes_of`;
-    is_bold: in front of the ego."""
-    for car in range(len(boxes)):
-        heading, speed, half = boxes[car, 2], boxes[car, 3], boxes[car, 4]
-        dx, dy, u, v = position[0] - boxes[car, 0], position[1] - boxes[car, 1], math.cos(heading), math.sin(heading)
-        ahead, left = dx * u + dy * v - half, dy * u - dx * v
-        sideways = way[1] * u - way[0] * v  # how far the stretch goes across the car's corridor
+    then is beside them or can neither stop nor pass. is_bold: in front of the ego, unless it turns, as it then sees
+    them late."""
+    bold_before_ego = is_bold and abs(cars.curvature) < STRAIGHT
+    for car in range(len(cars.boxes)):
+        curvature = cars.curvature if car == EGO else 0.0
+        speed, half = cars.boxes[car, 3], cars.boxes[car, 4]
+        ahead, left = _before(cars.boxes[car], position[0], position[1], curvature)
+        farther, then_left = _before(cars.boxes[car], position[0] + way[0], position[1] + way[1], curvature)
+        sideways = then_left - left  # how far the stretch goes across the car's corridor
         if abs(sideways) <= STANDS_STILL or left * sideways >= 0:
             continue
         share = (abs(left) - CORRIDOR) / abs(sideways)
         if 0 < share <= 1:
             arrives = share * math.hypot(way[0], way[1]) / pace
-            then = ahead + share * (way[0] * u + way[1] * v) - speed * arrives
+            then = ahead + share * (farther - ahead) - speed * arrives
             if then <= -2 * half - PASSED:
                 continue
-            if is_bold and car == EGO:
+            if bold_before_ego and car == EGO:
                 if _cannot_stop_at_once(then, speed, 2 * CORRIDOR / pace):
                     return False
             elif _cannot_stop(then, arrives, speed, 2 * CORRIDOR / pace):
@@ -56,14 +70,14 @@ def may_walk(position: Points, way: tuple[float, float], pace: float, boxes: Flo
 
 
 @compiled
-def bumps(position: Points, step: tuple[float, float], boxes: Floats) -> bool:
+def bumps(position: Points, step: tuple[float, float], cars: Cars) -> bool:
     """Whether a step (x, y in m) leads somebody (2,) into a car, or in front of one that would reach them even if it
     braked fully: a car that turns may come to be before people who have entered no corridor, and beside them."""
-    for car in range(len(boxes)):
-        heading, speed, half = boxes[car, 2], boxes[car, 3], boxes[car, 4]
-        dx, dy, u, v = position[0] - boxes[car, 0], position[1] - boxes[car, 1], math.cos(heading), math.sin(heading)
-        ahead, left = dx * u + dy * v - half, dy * u - dx * v
-        then_ahead, then_left = ahead + step[0] * u + step[1] * v, left + step[1] * u - step[0] * v
+    for car in range(len(cars.boxes)):
+        curvature = cars.curvature if car == EGO else 0.0
+        speed, half = cars.boxes[car, 3], cars.boxes[car, 4]
+        ahead, left = _before(cars.boxes[car], position[0], position[1], curvature)
+        then_ahead, then_left = _before(cars.boxes[car], position[0] + step[0], position[1] + step[1], curvature)
         reach = TOUCH
         if speed > MOVING:
             reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
@@ -72,6 +86,35 @@ def bumps(position: Points, step: tuple[float, float], boxes: Floats) -> bool:
         if will_be and (not is_near or (ahead < TOUCH and abs(then_left) < abs(left))):
             return True
     return False
+
+
+@compiled
+def is_clear(position: Points, end: Points, cars: Cars) -> bool:
+    """Whether no car stands in the way of somebody who crosses from one place (2,) to another."""
+    length = math.hypot(end[0] - position[0], end[1] - position[1])
+    n = int(length / STEPS_OVER) + 1
+    for car in range(len(cars.boxes)):
+        if car == EGO or cars.boxes[car, 3] > MOVING:
+            continue
+        for k in range(n + 1):
+            x, y = position[0] + (end[0] - position[0]) * k / n, position[1] + (end[1] - position[1]) * k / n
+            ahead, left = _before(cars.boxes[car], x, y, 0.0)
+            if -2 * cars.boxes[car, 4] - 2 * TOUCH < ahead < 2 * TOUCH and abs(left) < BODY:
+                return False
+    return True
+
+
+@inlined
+def _before(box: Floats, x: float, y: float, curvature: float) -> tuple[float, float]:
+    """How far a place lies ahead of a car's front and left of its middle, m; along its path where that is curved."""
+    u, v = math.cos(box[2]), math.sin(box[2])
+    dx, dy = x - box[0], y - box[1]
+    ahead, left = dx * u + dy * v, dy * u - dx * v
+    if ahead > 0 and abs(curvature) >= STRAIGHT:
+        side, radius = math.copysign(1.0, curvature), 1 / abs(curvature)
+        to_center = radius - side * left
+        return radius * math.atan2(ahead, to_center) - box[4], side * (radius - math.hypot(ahead, to_center))
+    return ahead - box[4], left
 
 
 @inlined

@@ -19,7 +19,7 @@ from caldrive.compiled import compiled, inlined
 from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
 from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.traffic.gap_acceptance import bumps, may_walk
+from caldrive.world.traffic.gap_acceptance import Cars, bumps, is_clear, may_walk
 from caldrive.world.traffic.sidewalks import Crossing, Floats, Loops, find_sidewalks, require_room
 
 MEAN_WALK_BETWEEN_CROSSINGS = 20.0  # s
@@ -102,17 +102,19 @@ class Pedestrians:
         )  # fmt: skip
         self.crossing: list[Crossing | None] = [None] * n
         self._screened = [_screened(ways, screens) for ways in self.sidewalks.crossings] if n else []
+        self._cars = Cars(boxes_of(()))
         self._hiding: set[int] = set()  # those who look for something to come from behind
         walk_on(self.walkers, self.sidewalks.loops, np.arange(n), dt=0.0)
 
-    def step(self, dt: float, cars: Sequence[VehicleState]) -> None:
-        """Everybody walks on for dt seconds."""
+    def step(self, dt: float, cars: Sequence[VehicleState], curvature: float = 0.0) -> None:
+        """Everybody walks on for dt seconds. cars: the ego first; curvature: of its path, 1/m."""
+        self._cars = Cars(boxes_of(cars), curvature)
         starts = self.rng.random(self.n) < self.rate * dt
         crossing = np.array([way is not None for way in self.crossing], dtype=bool)
         who = np.flatnonzero(crossing)
         if len(who):
             arrived, kerb = np.zeros(len(who), np.bool_), np.zeros(len(who), np.bool_)
-            cross_on(self.walkers, who, dt, boxes_of(cars), arrived, kerb)
+            cross_on(self.walkers, who, dt, self._cars, arrived, kerb)
             for k, is_there, at_kerb in zip(who.tolist(), arrived.tolist(), kerb.tolist(), strict=True):
                 self._end_crossing(k, is_there, at_kerb)
         walk_on(self.walkers, self.sidewalks.loops, np.flatnonzero(~crossing), dt)
@@ -135,10 +137,10 @@ class Pedestrians:
             self._look_for_a_way(k, self.sidewalks.crossings)
 
     def _look_for_a_way(self, k: int, ways: Sequence[Sequence[Crossing]]) -> None:
-        """Somebody crosses if one of these ways begins here."""
+        """Somebody crosses if one of these ways begins here, and no car stands in it."""
         s = self.walkers.s[k]
         near = next((way for way in ways[self.walkers.loop[k]] if abs(way.s - s) < CROSSING_REACH), None)
-        if near is not None:
+        if near is not None and is_clear(self.walkers.position[k], near.end, self._cars):
             self._hiding.discard(k)
             self._take(k, near)
 
@@ -197,11 +199,9 @@ def walk_on(walkers: Walkers, loops: Loops, who: NDArray[np.int64], dt: float) -
 
 
 @compiled
-def cross_on(
-    walkers: Walkers, who: NDArray[np.int64], dt: float, boxes: Floats, arrived: Flags, at_kerb: Flags
-) -> None:
+def cross_on(walkers: Walkers, who: NDArray[np.int64], dt: float, cars: Cars, arrived: Flags, at_kerb: Flags) -> None:
     """Those who cross go on for dt seconds, or wait for a car. Writes who arrives, and who is still at the kerb (len
-    (who),). boxes: see `geometry.boxes_of`."""
+    (who),)."""
     for i in range(len(who)):
         k = who[i]
         position, pace, is_bold = walkers.position[k], walkers.crossing_pace[k], walkers.bold[k]
@@ -213,8 +213,8 @@ def cross_on(
         look = rest if at_kerb[i] and not is_bold else step
         arrived[i] = rest <= step
         walkers.heading[k] = math.atan2(ahead_y, ahead_x)
-        walkers.walking[k] = may_walk(position, (ahead_x * look, ahead_y * look), pace, boxes, is_bold)
-        walkers.walking[k] &= not bumps(position, (ahead_x * step, ahead_y * step), boxes)
+        walkers.walking[k] = may_walk(position, (ahead_x * look, ahead_y * look), pace, cars, is_bold)
+        walkers.walking[k] &= not bumps(position, (ahead_x * step, ahead_y * step), cars)
         if walkers.walking[k]:
             position[0] += min(step, rest) * ahead_x
             position[1] += min(step, rest) * ahead_y
