@@ -16,7 +16,7 @@ MISTAKES = {
     "no verb": ([], "wanted one of drive, benchmark"),
     "unknown option": ([*DRIVE, "--wings", "2"], "--wings"),
     "no number": ([*DRIVE, "--cars", "many"], "--cars"),
-    "unknown town": ([*DRIVE, "--town", "mars"], "town01, town02 or an OpenDRIVE file"),
+    "unknown town": ([*DRIVE, "--town", "mars"], "random:SEED or an OpenDRIVE file"),
     "no such map": ([*DRIVE, "--town", "{tmp}/gone.xodr"], "check the path given to --town"),
     "broken map": ([*DRIVE, "--town", "{tmp}/broken.xodr"], "give another .xodr file"),
     "empty map": ([*DRIVE, "--town", "{tmp}/empty.xodr"], "give another .xodr file"),
