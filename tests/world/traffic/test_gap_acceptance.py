@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 
-from caldrive.datatypes import Pose, VehicleState
-from caldrive.geometry import boxes_of
+from caldrive.datatypes import Control, Pose, VehicleState
+from caldrive.geometry import box_corners, boxes_of
+from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
 from caldrive.world.traffic.gap_acceptance import Cars, bumps, is_clear, may_walk
 
 
@@ -112,22 +114,42 @@ def test_nobody_steps_before_a_car_that_cannot_stop_any_more_and_who_is_there_go
 
 
 TURN = 1 / 8.0  # 1/m
+REAR_AXLE = 0.6 * 2.1  # m behind a car's middle
 
 
 @pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
 def test_people_look_along_the_path_of_an_ego_that_turns(side: int) -> None:
     def beside(angle: float, left: float) -> tuple[float, float]:
         """A place so far along the path, and so many m left of it where it turns left."""
-        return (8.0 - left) * math.sin(angle), side * (8.0 - (8.0 - left) * math.cos(angle))
+        return (8.0 - left) * math.sin(angle) - REAR_AXLE, side * (8.0 - (8.0 - left) * math.cos(angle))
 
     there, onto = beside(0.8, 2.1), beside(0.8, 1.8)
     step = (onto[0] - there[0], onto[1] - there[1])
     assert may(car(4.0), *there, *step)
     assert not may(car(4.0), *there, *step, bold=True, curvature=side * TURN)
-    near, nearer = beside(0.45, 1.4), beside(0.45, 1.3)
+    near, nearer = beside(0.6, 1.4), beside(0.6, 1.3)
     step = (nearer[0] - near[0], nearer[1] - near[1])
     assert not bumps(np.array(near), step, Cars(boxes_of([car(4.0)])))
     assert bumps(np.array(near), step, Cars(boxes_of([car(4.0)]), side * TURN))
+
+
+@pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
+@pytest.mark.parametrize("coming_from", [4.2, -2.6], ids=["inside", "outside"])
+@pytest.mark.parametrize("ahead", [1.0, 2.0, 3.0])
+def test_an_ego_that_turns_touches_nobody_who_comes_to_its_side(side: int, coming_from: float, ahead: float) -> None:
+    car = VehicleConfig()
+    ego = EgoState(Pose(0, 0, 0), speed=4.0, steer_angle=side * math.atan(car.wheelbase / 7))
+    control = Control(throttle=0.2, steer=ego.steer_angle / car.max_steer)
+    person, clear = np.array((ahead, side * coming_from)), math.inf
+    step = np.array((0.0, -0.13 * side * math.copysign(1.0, coming_from)))
+    for _ in range(40):
+        ego = advance(ego, control, 0.05, car)
+        here = VehicleState(ego.pose, ego.speed, length=car.length, width=car.width)
+        if not bumps(person, tuple(step.tolist()), Cars(boxes_of([here]), side / 7)):
+            person = person + step
+        body = shapely.Polygon(box_corners(ego.pose, car.length, car.width))
+        clear = min(clear, body.distance(shapely.Point(person)))
+    assert 0.3 < clear < 1.5
 
 
 def test_nobody_is_bold_before_an_ego_that_turns() -> None:
@@ -144,8 +166,8 @@ def test_a_curved_path_is_as_long_as_it_is(curvature: float) -> None:
 
     def nearest(bend: float) -> float:
         for ahead in np.arange(3.0, 14.0, 0.1).tolist():
-            angle = ahead * bend
-            x, y = (math.sin(angle) / bend, (1 - math.cos(angle)) / bend) if bend else (ahead, 0.0)
+            angle = (ahead + REAR_AXLE) * bend
+            x, y = (math.sin(angle) / bend - REAR_AXLE, (1 - math.cos(angle)) / bend) if bend else (ahead, 0.0)
             u, v = math.cos(angle), math.sin(angle)
             if may(car(3.0), x + 2.1 * v, y - 2.1 * u, -0.2 * v, 0.2 * u, curvature=bend):
                 return float(ahead)

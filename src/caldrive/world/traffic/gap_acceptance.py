@@ -27,6 +27,7 @@ REACTION, HARD_BRAKE, SPARE = 0.3, 6.5, 0.8
 EGO = 0  # its row among the boxes
 BODY, TOUCH = 1.35, 0.45  # m: half of a car and of a person beside it, and from its ends, with some room
 FULL_BRAKE, LEFT_OVER = 7.0, 0.3  # m/s² of a driver who brakes already, and m that remain
+REAR = 0.6  # halves of a car's length from its middle back to its rear axle
 STRAIGHT = 0.02  # 1/m: less curved paths are as good as straight
 STEPS_OVER = 0.4  # m from one look along a way to the next
 Floats = NDArray[np.float64]
@@ -81,8 +82,8 @@ def bumps(position: Points, step: tuple[float, float], cars: Cars) -> bool:
         reach = TOUCH
         if speed > MOVING:
             reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
-        is_near = -2 * half - TOUCH < ahead < reach and abs(left) < BODY
-        will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < BODY
+        is_near = -2 * half - TOUCH < ahead < reach and abs(left) < _body(left, half, curvature)
+        will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < _body(then_left, half, curvature)
         if will_be and (not is_near or (ahead < TOUCH and abs(then_left) < abs(left))):
             return True
     return False
@@ -109,12 +110,20 @@ def _before(box: Floats, x: float, y: float, curvature: float) -> tuple[float, f
     """How far a place lies ahead of a car's front and left of its middle, m; along its path where that is curved."""
     u, v = math.cos(box[2]), math.sin(box[2])
     dx, dy = x - box[0], y - box[1]
-    ahead, left = dx * u + dy * v, dy * u - dx * v
-    if ahead > 0 and abs(curvature) >= STRAIGHT:
+    ahead, left, rear = dx * u + dy * v, dy * u - dx * v, REAR * box[4]
+    if ahead > -rear and abs(curvature) >= STRAIGHT:  # it turns around a point beside its rear axle
         side, radius = math.copysign(1.0, curvature), 1 / abs(curvature)
         to_center = radius - side * left
-        return radius * math.atan2(ahead, to_center) - box[4], side * (radius - math.hypot(ahead, to_center))
+        along = radius * math.atan2(ahead + rear, to_center) - rear
+        return along - box[4], side * (radius - math.hypot(ahead + rear, to_center))
     return ahead - box[4], left
+
+
+@inlined
+def _body(left: float, half: float, curvature: float) -> float:
+    """m from the path of a car within which it touches somebody left of it: its front swings out of a turn."""
+    front = (1 + REAR) * half
+    return BODY + front * front * abs(curvature) / 2 if left * curvature < 0 else BODY
 
 
 @inlined
