@@ -7,7 +7,6 @@ ARGS ?=
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 MODEL := out/model
-RESULTS := out/results
 
 .PHONY: drive test lint docs coverage newest model results clean
 drive: $(READY)
@@ -60,27 +59,10 @@ model: $(READY)
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
-# The suites for both agents, and in docs/results the report's tables and every episode's line (compressed), from which
-# the tables follow again; the HTML report stays in out/results. A run that was stopped goes on. An episode that one
-# suite shares with another is driven once.
+# All suites with all drivers, and in docs/results the report's tables and every episode's line (compressed), from which
+# the tables follow again; the HTML reports stay in out/results. A run that was stopped goes on.
 results: $(READY)
-	@for agent in oracle cal; do \
-		known=(); \
-		for suite in corl2017 nocrash traffic-school; do \
-			$(BIN)/caldrive benchmark --suite $$suite --agent $$agent --out $(RESULTS)/$$suite/$$agent "$${known[@]}" $(ARGS); \
-			known=(--known $(RESULTS)/corl2017/$$agent); \
-			[ $$suite = corl2017 ] || known+=($(RESULTS)/nocrash/$$agent); \
-		done; \
-	done
-	@for suite in corl2017 nocrash traffic-school; do \
-		$(BIN)/caldrive report $(RESULTS)/$$suite/oracle $(RESULTS)/$$suite/cal --out $(RESULTS)/$$suite; \
-		mkdir -p docs/results/$$suite/{oracle,cal}; \
-		cp $(RESULTS)/$$suite/report.md docs/results/$$suite; \
-		for agent in oracle cal; do \
-			cp $(RESULTS)/$$suite/$$agent/run.json docs/results/$$suite/$$agent; \
-			gzip -9nc $(RESULTS)/$$suite/$$agent/results.jsonl > docs/results/$$suite/$$agent/results.jsonl.gz; \
-		done; \
-	done
+	$(BIN)/python -m scripts.drive_results $(ARGS)
 
 # An environment that is there stays: it may hold PyTorch's CPU build, for the Python that it was made with.
 USED = $(or $(wildcard $(BIN)/python),$(PYTHON))

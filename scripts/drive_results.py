@@ -1,0 +1,90 @@
+"""Drives everything that docs/results.md tells of, and keeps each run's lines and each suite's report in docs/results.
+
+    python -m scripts.drive_results [--only unseen/oracle nocrash] [--workers 2] [--keep]
+
+A run that was stopped goes on; an episode that one suite shares with another is driven once. `--keep` drives nothing
+and keeps what is there. The HTML reports stay in out/results.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from caldrive.files import write_whole
+
+OUT, KEPT = Path("out/results"), Path(__file__).parents[1] / "docs" / "results"
+ORACLE = ["--agent", "oracle"]
+AGENTS = {"oracle": ORACLE, "cal": ["--agent", "cal"]}
+WITHOUT = {  # drivers who know the truth but for something
+    "oracle-without-hazards": [*ORACLE, "--blind", "hazard_stop"],
+    "oracle-without-distance": [*ORACLE, "--blind", "vehicle_distance"],
+    "oracle-without-hazards-and-distance": [*ORACLE, "--blind", "hazard_stop", "--blind", "vehicle_distance"],
+    "oracle-without-lights": [*ORACLE, "--blind", "red_light"],
+    "oracle-without-signs": [*ORACLE, "--blind", "speed_sign", "--signs"],
+    "oracle-with-signs": [*ORACLE, "--signs"],
+}
+SUITES = {  # who drives in each; those that come first are known to the later ones
+    "dynamic": {**AGENTS, **WITHOUT},
+    "unseen": {**AGENTS, **WITHOUT},
+    "unseen-wide": AGENTS,
+    "corl2017": AGENTS,
+    "nocrash": AGENTS,
+    "traffic-school": AGENTS,
+}
+KNOWN = {"corl2017": ("dynamic",), "traffic-school": ("nocrash",)}
+
+
+def chosen(only: list[str]) -> Iterator[tuple[str, str]]:
+    """The suites and drivers that words such as `unseen/oracle` or `nocrash` name; all for none."""
+    for suite, drivers in SUITES.items():
+        for driver in drivers:
+            if not only or suite in only or f"{suite}/{driver}" in only:
+                yield suite, driver
+
+
+def drive(suite: str, driver: str, workers: str) -> None:
+    """Drives a suite, or what is left of it."""
+    known = [OUT / other / driver for other in KNOWN.get(suite, ()) if (OUT / other / driver).exists()]
+    words = ["benchmark", "--suite", suite, *SUITES[suite][driver], "--workers", workers]
+    words += ["--out", str(OUT / suite / driver), *(["--known", *map(str, known)] if known else [])]
+    print("caldrive", *words, flush=True)
+    subprocess.run([sys.executable, "-m", "caldrive", *words], check=True)
+
+
+def keep(suite: str, drivers: list[str]) -> None:
+    """Writes a suite's report, and keeps it with the lines of its drivers."""
+    folders = [str(OUT / suite / driver) for driver in drivers]
+    command = [sys.executable, "-m", "caldrive", "report", *folders, "--out", str(OUT / suite)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    kept = KEPT / suite
+    kept.mkdir(parents=True, exist_ok=True)
+    write_whole(kept / "report.md", (OUT / suite / "report.md").read_bytes())
+    for driver in drivers:
+        (kept / driver).mkdir(exist_ok=True)
+        write_whole(kept / driver / "run.json", (OUT / suite / driver / "run.json").read_bytes())
+        lines = gzip.compress((OUT / suite / driver / "results.jsonl").read_bytes(), mtime=0)
+        write_whole(kept / driver / "results.jsonl.gz", lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="*", default=[])
+    parser.add_argument("--workers", default="2")
+    parser.add_argument("--keep", action="store_true")
+    options = parser.parse_args()
+    runs = list(chosen(options.only))
+    for suite, driver in [] if options.keep else runs:
+        drive(suite, driver, options.workers)
+    for suite in dict.fromkeys(suite for suite, _ in runs):
+        if drivers := [name for name in SUITES[suite] if (OUT / suite / name / "results.jsonl").exists()]:
+            keep(suite, drivers)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
