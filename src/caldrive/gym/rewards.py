@@ -1,0 +1,108 @@
+"""Rewards: each a sum of named terms with weights.
+
+`carla2017` is that of the paper's RL (CARLA paper, supplement S.2.3); `roach` that of Roach and of Implicit Affordances
+(Zhang et al. 2021; Toromanoff et al. 2020), from the truth alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from caldrive.datatypes import KMH, Control, Truth
+from caldrive.geometry import to_local
+
+MOST_WANTED = 6.0  # m/s, the speed that `roach` wants on a free road
+ROOM = 5.0  # m over which it falls to 0
+BEFORE_CAR, BEFORE_PERSON, BEFORE_LIGHT = 8.0, 6.0, 5.0  # m, between middles, at which it is 0
+CORRIDOR = 2.0  # m to either side in which somebody is ahead
+FARTHEST_LIGHT = 15.0  # m
+STEADY = 0.01  # of the steering, below which a change is none
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a reward is made of: what was true before and is now, and how it was driven before and since."""
+
+    before: Truth
+    now: Truth
+    last: Control
+    control: Control
+    broke: bool
+    """Whether a rule was broken that ends the episode."""
+
+
+Terms = Callable[[Moment], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A reward."""
+
+    terms: Terms
+    """Without weights."""
+    weights: Mapping[str, float]
+    """By the names of the terms."""
+
+    def rewards(self, moment: Moment, changed: Mapping[str, float]) -> dict[str, float]:
+        """The terms with their weights; their sum is the reward. changed: weights in place of the preset's."""
+        weights = {**self.weights, **changed}
+        return {name: weights[name] * value for name, value in self.terms(moment).items()}
+
+
+def carla2017_terms(moment: Moment) -> dict[str, float]:
+    """S.2.3: kilometres towards the goal along the route, km/h gained, damage (impulses in N s), and how much more of
+    the car is on the sidewalk and on the opposite lane."""
+    before, now = moment.before, moment.now
+    return {
+        "distance": (now.route_done - before.route_done) / 1000,
+        "speed": (now.ego.speed - before.ego.speed) / KMH,
+        "damage": -sum(contact.impulse for contact in now.contacts),
+        "sidewalk": -(now.sidewalk_share - before.sidewalk_share),
+        "opposite_lane": -(now.opposite_share - before.opposite_share),
+    }
+
+
+def roach_terms(moment: Moment) -> dict[str, float]:
+    """Speed near the wanted one, distance to the centre line (m) and angle to the route (rad), changes of the steering,
+    and the end by a broken rule."""
+    now, seen = moment.now, moment.now.affordances
+    return {
+        "speed": 1 - abs(now.ego.speed - wanted_speed(now)) / MOST_WANTED,
+        "position": -abs(seen.center_distance) / 2,
+        "angle": -abs(seen.relative_angle),
+        "steering": -float(abs(moment.control.steer - moment.last.steer) > STEADY),
+        "end": -(1 + now.ego.speed) if moment.broke else 0.0,
+    }
+
+
+def wanted_speed(truth: Truth) -> float:
+    """m/s: MOST_WANTED, and less the nearer a car, a person or a closed light is ahead."""
+    seen = truth.affordances
+    gaps = [seen.vehicle_distance + truth.ego.length - BEFORE_CAR]
+    for person in truth.pedestrians:
+        ahead, left = to_local(truth.ego.pose, (person.pose.x, person.pose.y)).tolist()  # type: ignore[arg-type]
+        if ahead > 0 and abs(left) < CORRIDOR and person.on_road:
+            gaps.append(ahead - BEFORE_PERSON)
+    if seen.red_light:
+        gaps.append(_to_light(truth) - BEFORE_LIGHT)
+    return MOST_WANTED * min(1.0, max(0.0, min(gaps) / ROOM))
+
+
+def _to_light(truth: Truth) -> float:
+    """m from the ego's middle to the nearest stop line ahead."""
+    aheads = []
+    for light in truth.lights:
+        (x0, y0), (x1, y1) = light.stop_line
+        ahead, left = to_local(truth.ego.pose, ((x0 + x1) / 2, (y0 + y1) / 2)).tolist()  # type: ignore[arg-type]
+        if 0 < ahead < FARTHEST_LIGHT and abs(left) < CORRIDOR:
+            aheads.append(ahead)
+    return min(aheads, default=FARTHEST_LIGHT)
+
+
+PRESETS: Mapping[str, Preset] = {
+    "carla2017": Preset(
+        carla2017_terms, {"distance": 1000.0, "speed": 0.05, "damage": 0.00002, "sidewalk": 2.0, "opposite_lane": 2.0}
+    ),
+    "roach": Preset(roach_terms, {"speed": 1.0, "position": 1.0, "angle": 1.0, "steering": 0.1, "end": 1.0}),
+}
