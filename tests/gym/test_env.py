@@ -119,6 +119,7 @@ def test_settings_may_change_at_reset_but_the_spaces_may_not(road: DrivingEnv) -
     [
         ({"weather": (1,)}, "did you mean weathers"),
         ({"reward": "roch"}, "did you mean roach"),
+        ({"rules": "stricter"}, "did you mean strict"),
         ({"weights": {"speeed": 1.0}}, "did you mean speed"),
         ({"tasks": ("swim",)}, "wanted one of straight"),
         ({"towns": ()}, "give some"),

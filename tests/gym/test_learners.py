@@ -8,8 +8,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
 from caldrive.datatypes import CameraConfig
-from caldrive.gym import DrivingEnv
-from caldrive.gym.vector import make_env, make_vec
+from caldrive.gym import DrivingEnv, make_env, make_vec
 
 SMALL = CameraConfig(width=40, height=40)
 

@@ -8,11 +8,10 @@ from difflib import get_close_matches
 from typing import Any, Literal
 
 from caldrive.datatypes import CameraConfig
+from caldrive.driving.rules import COLLISION, RULES
 from caldrive.driving.tasks import TASKS, TIME_LIMITS
 from caldrive.gym.rewards import PRESETS
 from caldrive.results import InfractionKind
-
-COLLISIONS = (InfractionKind.COLLISION_CAR, InfractionKind.COLLISION_OBJECT, InfractionKind.COLLISION_PERSON)
 
 
 @dataclass(frozen=True)
@@ -43,13 +42,14 @@ class EnvConfig:
     """A preset: carla2017 or roach."""
     weights: Mapping[str, float] = field(default_factory=dict)
     """Of the reward's terms, in place of the preset's."""
-    ends: tuple[InfractionKind, ...] = (*COLLISIONS, InfractionKind.SIDEWALK)
+    ends: tuple[InfractionKind, ...] = (*COLLISION.values(), InfractionKind.SIDEWALK)
     """Infractions that terminate an episode."""
     rules: str = "strict"
     """What counts as an infraction: strict, corl2017 or nocrash."""
 
     def __post_init__(self) -> None:
         _require("reward", self.reward, PRESETS)
+        _require("rules", self.rules, RULES)
         _require("time_limit", self.time_limit, TIME_LIMITS)
         _require("observation", self.observation, ("image", "affordances"))
         _require("action", self.action, ("continuous", "carla2017"))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -93,27 +93,6 @@ class JunctionLights:
         return waiting
 
 
-class _LoopDetectors:
-    """Loops in the road before all stop lines and inside all junctions, looked at in one go."""
-
-    def __init__(self, junctions: Iterable[JunctionLights]) -> None:
-        groups = [np.array([np.mean(post.stop_line, axis=0) for post in junction.posts]) for junction in junctions]
-        self.stops = np.concatenate(groups)
-        self.headings = np.array([post.pose.heading for junction in junctions for post in junction.posts])
-        self.centers = np.array([stops.mean(0) for stops in groups])
-        self.ends = np.cumsum([len(stops) for stops in groups])
-        self.radii = np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, self.centers, strict=True)])
-
-    def look(self, boxes: Points) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether somebody waits at each post (P,), and whether each junction is occupied (J,); boxes: of cars, see
-        `geometry.boxes_of`."""
-        waiting, occupied = np.zeros(len(self.headings), np.bool_), np.zeros(len(self.radii), np.bool_)
-        _look(boxes, self.stops, self.headings, waiting)
-        at = Junctions(self.centers, self.radii, self.ends, self.stops, self.headings)
-        _look_inside(boxes, at, occupied)
-        return waiting, occupied
-
-
 class Junctions(NamedTuple):
     """Where the junctions with lights are."""
 
@@ -129,6 +108,28 @@ class Junctions(NamedTuple):
     """(P,) of who drives towards them."""
 
 
+def _where(junctions: Sequence[JunctionLights]) -> Junctions:
+    """Where junctions with lights are; at least one."""
+    groups = [np.array([np.mean(post.stop_line, axis=0) for post in junction.posts]) for junction in junctions]
+    centers = np.array([stops.mean(0) for stops in groups])
+    return Junctions(
+        centers=centers,
+        radii=np.array([np.linalg.norm(g - c, axis=1).max() for g, c in zip(groups, centers, strict=True)]),
+        ends=np.cumsum([len(stops) for stops in groups]),
+        stops=np.concatenate(groups),
+        headings=np.array([post.pose.heading for junction in junctions for post in junction.posts]),
+    )
+
+
+def _look(boxes: Points, at: Junctions) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether somebody waits at each post (P,), and whether each junction is occupied (J,): loops in the road. boxes:
+    of cars, see `geometry.boxes_of`."""
+    waiting, occupied = np.zeros(len(at.headings), np.bool_), np.zeros(len(at.radii), np.bool_)
+    _look_before(boxes, at, waiting)
+    _look_inside(boxes, at, occupied)
+    return waiting, occupied
+
+
 @compiled
 def _waits(car: Points, stop: Points, heading: float) -> bool:
     """Whether a car (3,) waits at a stop line (2,)."""
@@ -140,11 +141,11 @@ def _waits(car: Points, stop: Points, heading: float) -> bool:
 
 
 @compiled
-def _look(boxes: Points, stops: Points, headings: Points, waiting: NDArray[np.bool_]) -> None:
-    """Writes whether somebody (N, 3) waits at each post (P,), by the middles of the stop lines (P, 2)."""
-    for post in range(len(stops)):
+def _look_before(boxes: Points, at: Junctions, waiting: NDArray[np.bool_]) -> None:
+    """Writes whether somebody waits at each post (P,)."""
+    for post in range(len(at.stops)):
         for k in range(len(boxes)):
-            waiting[post] |= _waits(boxes[k], stops[post], headings[post])
+            waiting[post] |= _waits(boxes[k], at.stops[post], at.headings[post])
 
 
 @compiled
@@ -174,15 +175,15 @@ class TrafficLights:
         for post in roads.posts:
             grouped[post.light].append(post)
         self.junctions = {name: JunctionLights(tuple(posts), rng) for name, posts in sorted(grouped.items())}
-        self._detectors = _LoopDetectors(self.junctions.values()) if self.junctions else None
+        self._at = _where([*self.junctions.values()]) if self.junctions else None
         self.rng, self.demand, self._time = rng, demand, 0.0
         self._unseen = np.zeros(sum(len(junction.posts) for junction in self.junctions.values()), dtype=bool)
 
     def step(self, time: float, cars: Iterable[VehicleState]) -> None:
         """Moves all junctions on to a time (s), given everybody who drives."""
-        if self._detectors is None:
+        if self._at is None:
             return
-        waiting, occupied = self._detectors.look(boxes_of(cars))
+        waiting, occupied = _look(boxes_of(cars), self._at)
         if self.demand:
             self._unseen |= self.rng.random(len(self._unseen)) < self.demand * (time - self._time)
             self._unseen &= ~np.array([state is LightState.GREEN for state in self._shown()], dtype=bool)
