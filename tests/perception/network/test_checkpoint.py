@@ -74,6 +74,12 @@ def test_missing_damaged_and_foreign_files_are_told_apart(network: Network, tmp_
         load_network(path)
 
 
+def test_weights_of_another_agent_are_refused_by_its_name(tmp_path: Path) -> None:
+    write_tensors(tmp_path / "model.safetensors", {"weight": torch.zeros(1)}, {"kind": "cil"})
+    with pytest.raises(CheckpointError, match="weights of the agent cil, wanted those of cal: type --agent cil"):
+        read_info(tmp_path / "model.safetensors")
+
+
 def test_weights_of_another_network_are_refused(network: Network, tmp_path: Path) -> None:
     save_network(tmp_path / "model.safetensors", network, CheckpointInfo(NETWORKS["small"]))
     with pytest.raises(CheckpointError, match=r"do not fit|cannot be read"):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
@@ -25,6 +26,7 @@ FORMAT_VERSION = 2
 KEY = "caldrive"  # of the JSON in safetensors' metadata
 CAMERA_CHECK = "camera_check."  # what the names of the camera check's tensors begin with
 UNFINISHED = "unfinished.safetensors"  # a network in the folder of a training that goes on
+AGENTS = {"network": "cal", "cil": "cil", "mp": "mp", "rl": "rl"}  # by kind of tensors: who drives by them
 FLOATS = ("F64", "F32", "F16", "BF16")  # safetensors' names
 SMALLEST_SPREAD = 1e-12  # of the values of a matrix of weights; the smallest that 16 bits tell apart is 6e-8
 
@@ -92,6 +94,20 @@ def read_header(path: Path) -> dict[str, Any]:
     return header
 
 
+def require_kind(path: Path, header: Mapping[str, Any], wanted: str) -> None:
+    """Raises CheckpointError where a file's tensors are not of this kind (a key of `AGENTS`), but part of a training, or
+    the weights of another agent."""
+    found = header.get("kind")
+    if found == wanted:
+        return
+    if found in AGENTS:
+        raise CheckpointError(
+            f"found in {path} weights of the agent {AGENTS[found]}, wanted those of {AGENTS[wanted]}: type "
+            f"--agent {AGENTS[found]}, or give another file"
+        )
+    raise CheckpointError(f"found part of a training in {path}, wanted a finished network: give its model.safetensors")
+
+
 def _missing(path: Path) -> str:
     """A sentence on a file that is not there."""
     unfinished = path.with_name(UNFINISHED)
@@ -134,10 +150,7 @@ def read_info(path: Path | str) -> CheckpointInfo:
     kind."""
     path = Path(path)
     header = read_header(path)
-    if header.get("kind") != "network":
-        raise CheckpointError(
-            f"found part of a training in {path}, wanted a finished network: give its model.safetensors"
-        )
+    require_kind(path, header, "network")
     if header.get("specs") != describe():
         raise CheckpointError(
             f"found in {path} a network for other affordances, wanted those of this caldrive: train the network again"
