@@ -1,19 +1,17 @@
 """Agents by name: what makes each one, which camera it wants, and what its results depend on.
 
-Beside the names in AGENTS, `--agent` takes what an installed package offers in the entry-point group `caldrive.agents`,
-`package.module:Class` and `file.py:Class`. Such a class is an `interfaces.Agent`. Its maker is given `model` (a path or
-None), `controller` (an `interfaces.Controller`), `cap` (km/h or None) and `dt` (s) where it has parameters of these
-names; its attribute `camera` says which camera it wants.
+Beside the names in `rows.AGENTS`, `--agent` takes what an installed package offers in the entry-point group
+`caldrive.agents`, `package.module:Class` and `file.py:Class`. Such a class is an `interfaces.Agent`. Its maker is given
+`model` (a path or None), `controller` (an `interfaces.Controller`), `cap` (km/h or None) and `dt` (s) where it has
+parameters of these names; its attribute `camera` says which camera it wants.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from caldrive.agents.blind import require_affordances
+from caldrive.agents.rows import AGENTS, AgentEntry, require_taken
 from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
 from caldrive.datatypes import CameraConfig
@@ -21,87 +19,7 @@ from caldrive.interfaces import Agent, TruthSource
 from caldrive.plugins import Plugin, attribute, find_plugin
 from caldrive.provenance import file_digest
 
-if TYPE_CHECKING:  # the command line's help waits for neither torch nor SUMO
-    from caldrive.agents.cal import CALAgent
-
-OFFERED = ("model", "controller")  # settings that an agent may take
-SHIPPED_MODEL = Path(__file__).parents[1] / "models" / "cal.safetensors"
-
-
-@dataclass(frozen=True)
-class AgentEntry:
-    """A row of the registry."""
-
-    make: Callable[[AgentSettings, float, TruthSource | None], Agent]
-    """The agent for settings, the seconds of a step, and, for the privileged only, where the truth comes from."""
-    camera: Callable[[AgentSettings], CameraConfig | None]
-    """The camera that it wants, None where it looks at no image."""
-    provenance: Callable[[AgentSettings], dict[str, Any]]
-    """What results depend on beside the settings."""
-    privileged: bool = False
-    """Whether it knows the truth, and so is no agent under test."""
-
-
-def model_path(model: Path | None) -> Path:
-    """The model asked for, or the package's. Raises FileNotFoundError where there is none."""
-    if model is None and not SHIPPED_MODEL.is_file():
-        raise FileNotFoundError(
-            "found no trained network in this package, wanted one for the agent cal: "
-            "type --agent oracle, or make one with `caldrive train` and give it with --model FILE"
-        )
-    return model or SHIPPED_MODEL
-
-
-def make_cal(settings: AgentSettings, dt: float, threads: int | None = 1) -> CALAgent:
-    """The agent that drives by a network. dt: seconds of a step. threads: how many it may use, None for all cores."""
-    from caldrive.agents.cal import CALAgent
-    from caldrive.perception.inference.predictor import NetworkPerception
-
-    perception = NetworkPerception(model_path(settings.model), threads=threads)
-    return CALAgent(perception, make_controller(settings.controller, settings.cap, dt))
-
-
-def _cal_camera(settings: AgentSettings) -> CameraConfig:
-    from caldrive.perception.network.checkpoint import read_info
-
-    path = model_path(settings.model)
-    info = read_info(path)
-    if not info.ranges:
-        raise ValueError(
-            f"found no ranges for 8-bit integers in {path}, without which an image takes many times as long, wanted "
-            "those that every training finds: train it again"
-        )
-    network = info.config
-    return CameraConfig(width=network.image_width, height=network.image_height)
-
-
-def _cal_provenance(settings: AgentSettings) -> dict[str, Any]:
-    from caldrive.perception.inference.precision import driving_precision
-    from caldrive.perception.network.checkpoint import read_info
-
-    path = model_path(settings.model)
-    return {"model": file_digest(path), "precision": driving_precision("auto", read_info(path).ranges)}
-
-
-def _make_oracle(settings: AgentSettings, dt: float, truth: TruthSource | None) -> CALAgent:
-    from caldrive.agents.cal import CALAgent, OraclePerception
-
-    _require_taken("the oracle", ("controller",), settings)
-    assert truth is not None
-    return CALAgent(OraclePerception(truth), make_controller(settings.controller, settings.cap, dt))
-
-
-def _oracle_provenance(settings: AgentSettings) -> dict[str, Any]:
-    _require_taken("the oracle", ("controller",), settings)
-    return {}
-
-
-AGENTS: dict[str, AgentEntry] = {
-    "cal": AgentEntry(
-        make=lambda settings, dt, _: make_cal(settings, dt), camera=_cal_camera, provenance=_cal_provenance
-    ),
-    "oracle": AgentEntry(make=_make_oracle, camera=lambda _: None, provenance=_oracle_provenance, privileged=True),
-}
+OFFERED = ("model", "controller")  # settings that somebody's own class may take
 
 
 def agent_entry(name: str) -> AgentEntry:
@@ -118,7 +36,7 @@ def _plugin_entry(plugin: Plugin) -> AgentEntry:
     hint = ", or give its __init__ a parameter of this name"
 
     def make(settings: AgentSettings, dt: float, truth: TruthSource | None) -> Agent:
-        _require_taken(plugin.name, taken, settings, hint)
+        require_taken(plugin.name, taken, settings, hint)
         options: dict[str, Any] = {"model": settings.model, "cap": settings.cap, "dt": dt}
         if "controller" in taken:
             options["controller"] = make_controller(settings.controller, settings.cap, dt)
@@ -130,7 +48,7 @@ def _plugin_entry(plugin: Plugin) -> AgentEntry:
         return agent
 
     def provenance(settings: AgentSettings) -> dict[str, Any]:
-        _require_taken(plugin.name, taken, settings, hint)
+        require_taken(plugin.name, taken, settings, hint)
         model = {"model": file_digest(settings.model)} if settings.model else {}
         return {"agent_source": plugin.source} | model
 
@@ -146,17 +64,6 @@ def _plugin_camera(plugin: Plugin) -> CameraConfig | None:
             "set it to caldrive.CameraConfig(width=200, height=88)"
         )
     return camera
-
-
-def _require_taken(agent: str, taken: Sequence[str], settings: AgentSettings, hint: str = "") -> None:
-    """Raises ValueError where settings name a model or a controller that an agent would never see. taken: what it
-    takes; hint: what else to do."""
-    usual = AgentSettings()
-    for name in OFFERED:
-        if getattr(settings, name) != getattr(usual, name) and name not in taken:
-            raise ValueError(
-                f"found --{name} {getattr(settings, name)}, but {agent} takes none: leave --{name} out{hint}"
-            )
 
 
 def provenance(settings: AgentSettings) -> dict[str, Any]:

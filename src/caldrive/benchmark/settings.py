@@ -43,4 +43,5 @@ class BenchmarkSettings(AgentSettings):
             controller=full_name(self.controller),
             cap=None if self.signs else self.cap,
             blind=self.blind,
+            variant=self.variant,
         )

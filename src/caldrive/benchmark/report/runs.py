@@ -68,6 +68,7 @@ class BenchmarkRun:
         for option, name in OPTIONS.items():
             words += [option, str(about[name])] if about[name] != getattr(usual, name) else []
         words += [word for name in about.get("blind") or () for word in ("--blind", name)]
+        words += ["--variant", about["variant"]] if about.get("variant") else []
         words += ["--model", about["model_file"]] if about.get("model_file") else []
         return shlex.join([*words, "--out", "DIR"])
 
@@ -112,7 +113,8 @@ def load_run(path: Path) -> BenchmarkRun:
     if len(whole) < len(results):
         lacking = next(result.trial.key for result in results if not _is_whole(result))
         problems.append(f"lines that lack figures and are left out: {len(results) - len(whole)}, such as {lacking}")
-    name = " ".join([short_name(folder.description["agent"]), *_blindness(folder.description)])
+    about = folder.description
+    name = " ".join([short_name(about["agent"]), *filter(None, [about.get("variant")]), *_blindness(about)])
     return BenchmarkRun(
         name=name, folder=path, description=folder.description, results=whole, problems=tuple(problems)
     )  # fmt: skip
