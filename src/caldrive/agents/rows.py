@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,11 +127,14 @@ def _cil_camera(settings: AgentSettings) -> CameraConfig:
     return CameraConfig(width=network.image_width, height=network.image_height)
 
 
-def _learned_provenance(agent: str, settings: AgentSettings) -> dict[str, Any]:
-    """Of an agent that is a network alone, without affordances and controller."""
-    require_taken(f"the agent {agent}", ("model", "variant"), settings)
-    _require_variant(agent, settings)
-    return {"model": file_digest(model_path(settings.model, agent))}
+def _cil_provenance(settings: AgentSettings) -> dict[str, Any]:
+    from caldrive.agents.conditional_imitation.checkpoint import read_imitation_info
+    from caldrive.perception.inference.precision import driving_precision
+
+    require_taken("the agent cil", ("model", "variant"), settings)
+    _require_variant("cil", settings)
+    path = model_path(settings.model, "cil")
+    return {"model": file_digest(path), "precision": driving_precision("auto", read_imitation_info(path).ranges)}
 
 
 AGENTS: dict[str, AgentEntry] = {
@@ -143,7 +145,7 @@ AGENTS: dict[str, AgentEntry] = {
     "cil": AgentEntry(
         make=_make_cil,
         camera=_cil_camera,
-        provenance=partial(_learned_provenance, "cil"),
+        provenance=_cil_provenance,
         variants={"avoid-stopping": "with the released agent's forced-stop fix"},
     ),
 }

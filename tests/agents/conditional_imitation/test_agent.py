@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,11 +12,16 @@ import torch
 
 from caldrive.agents.conditional_imitation.agent import ImitationAgent, WheelRules, rules_for, wheel_control
 from caldrive.agents.conditional_imitation.checkpoint import ImitationInfo, save_imitation
+from caldrive.agents.conditional_imitation.config import ImitationNetworkConfig
+from caldrive.agents.conditional_imitation.engine import image_engine
 from caldrive.agents.conditional_imitation.network import ImitationNetwork
 from caldrive.agents.registry import agent_entry, provenance
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import Command, Control
 from caldrive.driving.setup import set_up
+from caldrive.perception.images import to_float
+from caldrive.perception.inference.precision import has_vnni
+from caldrive.perception.network.calibration import input_ranges
 from tests.agents.conditional_imitation.data import SMALL
 from tests.perception.data import column_image, see
 
@@ -99,3 +105,15 @@ def test_what_it_does_not_take_is_refused(tmp_path: Path) -> None:
     save_imitation(path, ImitationNetwork(SMALL), ImitationInfo(SMALL))
     with pytest.raises(ValueError, match="ImitationAgent has no perception that could be blind"):
         set_up(AgentSettings(agent="cil", model=path, blind=("hazard_stop",)))
+
+
+@pytest.mark.parametrize("backbone", ["published", "cal"])
+def test_integers_say_what_whole_numbers_say(backbone: Literal["published", "cal"]) -> None:
+    torch.manual_seed(0)
+    network = ImitationNetwork(ImitationNetworkConfig(backbone=backbone)).eval()
+    image = np.random.default_rng(0).integers(0, 255, (88, 200, 3), dtype=np.uint8)
+    with torch.inference_mode():
+        ranges = input_ranges(network.trunk, network.normalised(to_float(image[None])))
+    precisions = ("fp32", "int8" if has_vnni() else "int7")  # 8 bits overflow without VNNI
+    whole, integers = (image_engine(network, precision, ranges, threads=1)(image) for precision in precisions)
+    assert float((whole - integers).abs().mean()) < 0.1 * float(whole.abs().mean())

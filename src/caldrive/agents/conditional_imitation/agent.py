@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from caldrive.agents.conditional_imitation.checkpoint import load_imitation
+from caldrive.agents.conditional_imitation.checkpoint import ImitationInfo, load_imitation
+from caldrive.agents.conditional_imitation.engine import image_engine
 from caldrive.agents.conditional_imitation.network import ImitationNetwork
 from caldrive.datatypes import KMH, Control, Decision, Observation
 from caldrive.interfaces import BadImage
-from caldrive.perception.images import check_image, to_float
+from caldrive.perception.images import check_image
+from caldrive.perception.inference.precision import driving_precision
 from caldrive.perception.network.network import COMMANDS
 
 STOP = Control(brake=1.0)
@@ -72,8 +74,12 @@ class ImitationAgent:
         self, network: ImitationNetwork | Path, rules: WheelRules | None = None, *, avoid_stopping: bool = False,
         threads: int = 1,
     ) -> None:  # fmt: skip
-        self.network = network if isinstance(network, ImitationNetwork) else load_imitation(network)[0]
-        self.network.eval()
+        info = ImitationInfo(network.config) if isinstance(network, ImitationNetwork) else None
+        if not isinstance(network, ImitationNetwork):
+            network, info = load_imitation(network)
+        assert info is not None
+        self.network = network.eval()
+        self._look = image_engine(network, driving_precision("auto", info.ranges), info.ranges, threads)
         self.rules, self.avoid_stopping = rules or WheelRules(), avoid_stopping
         self.decision: Decision | None = None
         torch.set_num_threads(threads)
@@ -95,7 +101,7 @@ class ImitationAgent:
     def _control(self, observation: Observation) -> Control:
         command = torch.tensor([COMMANDS.index(observation.command)])
         speed = torch.tensor([observation.speed], dtype=torch.float32)
-        controls, seen = self.network(to_float(observation.image[None]), speed, command)
+        controls, seen = self.network.act(self._look(observation.image), speed, command)
         if not (controls.isfinite().all() and seen.isfinite().all()):
             raise BadImage("the network's outputs are not numbers: brake, and look at the weights")
         steer, throttle, brake = controls[0].tolist()

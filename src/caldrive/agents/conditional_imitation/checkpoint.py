@@ -30,12 +30,14 @@ MOST_BYTE = 127
 
 @dataclass(frozen=True)
 class ImitationInfo:
-    """What is known of a trained network: its settings, its data, and the figures of its validation."""
+    """What is known of a trained network: its settings, its data, the figures of its validation, and the range of what
+    enters each of its convolutions (empty where nobody looked)."""
 
     config: ImitationNetworkConfig
     data: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, float] = field(default_factory=dict)
     training: dict[str, Any] = field(default_factory=dict)
+    ranges: tuple[float, ...] = ()
 
 
 def _rows(values: Tensor) -> tuple[Tensor, Tensor]:

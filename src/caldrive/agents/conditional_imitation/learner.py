@@ -21,6 +21,7 @@ from caldrive.perception.dataset.augmentation import augmented
 from caldrive.perception.dataset.frames import Ids
 from caldrive.perception.images import to_float
 from caldrive.perception.inference.engines import autocast
+from caldrive.perception.network.calibration import input_ranges
 from caldrive.perception.network.network import COMMANDS
 from caldrive.perception.training.distributed import join_process_group
 from caldrive.perception.training.folder import TrainingFolder
@@ -29,6 +30,7 @@ from caldrive.progress import Progress, silent
 from caldrive.recordings.folder import episode_paths
 
 FRAMES_A_PASS = 64
+RANGE_FRAMES = 512  # on which the ranges of 8 bits are found
 
 
 def train_imitation(
@@ -128,8 +130,16 @@ class ImitationLearner:
             "train_frames": len(self.training), "validation_frames": len(self.validation),
             "validation_episodes": self.validation_keys,
         }  # fmt: skip
-        save_imitation(path, network, ImitationInfo(network.config, data, metrics, asdict(self.config)))
+        info = ImitationInfo(network.config, data, metrics, asdict(self.config), self._ranges(network))
+        save_imitation(path, network, info)
         return metrics
+
+    @torch.inference_mode()
+    def _ranges(self, network: ImitationNetwork) -> tuple[float, ...]:
+        """The ranges that driving in integers needs."""
+        ids = np.unique(self.sampler.draw(0, RANGE_FRAMES))  # of a small recording the same ones come again and again
+        images = to_float(self.training.images(ids)).to(self.device)
+        return input_ranges(network.trunk, network.normalised(images))
 
     @torch.inference_mode()
     def _measure(self, network: ImitationNetwork) -> dict[str, float]:

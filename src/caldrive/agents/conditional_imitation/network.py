@@ -74,7 +74,7 @@ class ImitationNetwork(nn.Module):
             sides = [(side - kernel) // stride + 1 for side in sides]
         return PUBLISHED[-1][2] * sides[0] * sides[1]
 
-    def _normalised(self, images: Tensor) -> Tensor:
+    def normalised(self, images: Tensor) -> Tensor:
         """Images as the convolutions take them: those of CAL with ImageNet's mean 0 and deviation 1."""
         if self.config.backbone == "published":
             return images
@@ -87,7 +87,10 @@ class ImitationNetwork(nn.Module):
 
     def forward(self, images: Tensor, speed: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
         """As the class says."""
-        image = self.image(self.trunk(self._normalised(images)))
+        return self.act(self.image(self.trunk(self.normalised(images))), speed, command)
+
+    def act(self, image: Tensor, speed: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
+        """The same from what the image was made into (N, nodes)."""
         joined = self.join(torch.cat((image, self.speed(speed[:, None] / SPEED_SCALE)), dim=1))
         by_command = torch.stack([branch(joined) for branch in self.branches], dim=1)  # (N, commands, 3)
         controls = by_command[torch.arange(len(command), device=command.device), command]
