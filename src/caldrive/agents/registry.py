@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from caldrive.agents.blind import require_affordances
 from caldrive.agents.rows import AGENTS, AgentEntry, require_taken
+from caldrive.agents.senses import require_senses
 from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
 from caldrive.datatypes import CameraConfig
@@ -72,7 +72,7 @@ def provenance(settings: AgentSettings) -> dict[str, Any]:
 
     Raises ValueError where no such agent can be made.
     """
-    require_affordances(settings.blind)
+    require_senses(settings.blind, settings.truth)
     return {
         "model": None, "precision": None, "agent_source": None,
         "controller_source": controller_source(settings.controller),

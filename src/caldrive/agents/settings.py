@@ -26,3 +26,6 @@ class AgentSettings:
     """A speed in km/h that no limit exceeds; the paper's comparison drives with 20."""
     blind: UseAppendAction[tuple[str, ...]] = ()
     """An affordance that the driver does not see, such as hazard_stop: it stays at its default. May be given again."""
+    truth: UseAppendAction[tuple[str, ...]] = ()
+    """An affordance that the driver knows instead of seeing it: who is told so is no longer under test. May be given
+    again."""

@@ -16,17 +16,9 @@ from caldrive.results import EpisodeResult, Outcome, result_from_values
 from caldrive.scenarios import Scenario
 
 SAME = (
-    "agent",
-    "agent_source",
-    "controller",
-    "controller_source",
-    "cap",
-    "blind",
-    "variant",
-    "code",
-    "model",
+    "agent", "agent_source", "controller", "controller_source", "cap", "blind", "truth", "variant", "code", "model",
     "precision",
-)
+)  # fmt: skip
 
 
 def reusable_records(
