@@ -17,6 +17,7 @@ from caldrive.commands.answer import Answer
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Data
 from caldrive.commands.drive import Determinism, Drive
+from caldrive.commands.explain import Blame
 from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
@@ -38,6 +39,7 @@ VERBS: Mapping[str, Verb] = {
     "benchmark": Verb(Benchmark, "Drive a whole suite, and count."),
     "replay": Verb(Replay, "Drive a benchmark's episode again, and film it."),
     "report": Verb(Report, "Tables and a page on one or more benchmarks."),
+    "blame": Verb(Blame, "Say which affordance is to blame for a benchmark's failures."),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
     "train": Verb(Train, "Train an agent's network on a recording."),
