@@ -22,7 +22,9 @@ class Collect(Configurable):
     out: Path = Path("out/recording")
     """Folder for the episodes."""
     workers: int = 2
-    """Processes that record at the same time."""
+    """Processes that record at the same time, here or with --ray local; a cluster uses all its processors."""
+    ray: str | None = None
+    """Record with Ray: local, auto for the cluster that this machine belongs to, or a cluster's address."""
 
     def run(self, progress: Progress) -> Answer:
         """Records what is missing; answers with the counts of labels."""
@@ -34,7 +36,7 @@ class Collect(Configurable):
         from caldrive.recordings.writer import episode_path
 
         require_writable_folder(self.out)
-        for _ in collect(self.recording, self.out, self.workers, progress):
+        for _ in collect(self.recording, self.out, self.workers, progress, self.ray):
             pass
         paths = (episode_path(self.out, k) for k in range(self.recording.episodes))
         counts = class_counts([read_episode(path, images=False) for path in paths])
