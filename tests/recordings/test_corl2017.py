@@ -25,16 +25,17 @@ from caldrive.recordings.corl2017_writer import distance_to_junction, targets, w
 from caldrive.recordings.folder import find_episodes, split
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError, EpisodeWriter
+from caldrive.scenarios import Scenario
 from tests.perception.data import SCENARIO, TINY, make_frame, record
 
 SIZE = (88, 200)
 COLUMN = {name: k for k, name in enumerate(COLUMNS)}
 
 
-def record_drive(folder: Path, episodes: int = 4, frames: int = 75) -> Path:
+def record_drive(folder: Path, episodes: int = 4, frames: int = 75, scenario: Scenario = SCENARIO) -> Path:
     """Episodes of three cameras, with another image, speed and control in each frame."""
     for number in range(episodes):
-        with EpisodeWriter(folder / f"episode-{number:05d}.parquet", SCENARIO) as writer:
+        with EpisodeWriter(folder / f"episode-{number:05d}.parquet", scenario) as writer:
             for index in range(frames):
                 for camera, left in enumerate((-0.5, 0.0, 0.5)):
                     clean = Control(index / 100, 0.25, 0.5 - index / 100)
@@ -210,6 +211,13 @@ def test_images_of_another_size_are_refused_before_anything_is_written(tmp_path:
 def test_too_few_frames_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     recording = record_drive(tmp_path / "recording", episodes=2, frames=20)
     with pytest.raises(EpisodeError, match=r"found 60 frames for SeqTrain in .*, wanted 200 or more"):
+        write_corl2017(recording, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_town_that_only_judges_is_not_given_to_learn_from(tmp_path: Path) -> None:
+    recording = record_drive(tmp_path / "recording", 2, 4, replace(SCENARIO, town="random:9000000"))
+    with pytest.raises(ValueError, match="found random:9000000 to learn from"):
         write_corl2017(recording, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -39,6 +39,7 @@ from caldrive.recordings.corl2017 import (
 from caldrive.recordings.folder import duplicates, episode_paths, joined, split
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError
+from caldrive.scenarios import require_not_held_out
 
 FOLLOW_DISTANCE = 20.0  # m before a junction at which the command to follow the lane ends: our choice
 CENTER, LEFT, RIGHT = 0, 1, 2  # cameras' numbers
@@ -63,18 +64,13 @@ def write_corl2017(
     """Writes a folder of recorded episodes as files of `out`/SeqTrain and `out`/SeqVal; those that are there are kept.
 
     validation_share: of the episodes, for SeqVal. Raises EpisodeError for a recording that cannot be written so (too
-    few frames, images of another size), ValueError where `out` holds files of something else or another process writes
-    in it, RuntimeError where h5py is missing.
+    few frames, images of another size), ValueError for a town that may only judge, and where `out` holds files of
+    something else or another process writes in it, RuntimeError where h5py is missing.
     """
     require_h5py()
     require_within("--validation-share", validation_share, 0.0, 1.0, 0.2)
     require_within("--seed", seed, 0, MOST_SEED, 0)
-    episodes = list(_read(episode_paths(recording), progress))
-    if sentences := duplicates(episodes):
-        raise EpisodeError(sentences[0])
-    parts = dict(zip(FOLDERS, split(episodes, validation_share, seed), strict=True))
-    for name, part in parts.items():
-        _require_frames(recording, name, part)
+    parts = _parts(recording, validation_share, seed, progress)
     files = [
         (out / name / f"data_{number:05d}.h5", part, number)
         for name, part in parts.items()
@@ -87,7 +83,7 @@ def write_corl2017(
             if not _is_whole(path):
                 write_whole(path, _file(part, number))
     written = len(files) * FRAMES
-    return Written(len(files), written, _frames(episodes) - written)
+    return Written(len(files), written, sum(map(_frames, parts.values())) - written)
 
 
 def targets(episode: Episode) -> NDArray[np.float32]:
@@ -140,6 +136,19 @@ def distance_to_junction(
     ends = np.union1d(np.flatnonzero(junction), len(time) - 1)
     distance: NDArray[np.float64] = travelled[ends[np.searchsorted(ends, np.arange(len(time)))]] - travelled
     return distance
+
+
+def _parts(recording: Path, validation_share: float, seed: int, progress: Progress) -> dict[str, list[Episode]]:
+    """The episodes of SeqTrain and of SeqVal, without their images. Raises ValueError for those that cannot be."""
+    episodes = list(_read(episode_paths(recording), progress))
+    if sentences := duplicates(episodes):
+        raise EpisodeError(sentences[0])
+    for town in {episode.scenario.town for episode in episodes}:
+        require_not_held_out(town)
+    parts = dict(zip(FOLDERS, split(episodes, validation_share, seed), strict=True))
+    for name, part in parts.items():
+        _require_frames(recording, name, part)
+    return parts
 
 
 def _read(paths: list[Path], progress: Progress) -> Iterator[Episode]:
