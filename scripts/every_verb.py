@@ -23,8 +23,9 @@ COMMANDS = {
     "benchmark": "--suite suite.json --workers 1 --out run",
     "replay": f"run {KEY} --out replay.mp4",
     "report": "run --out report",
-    "collect": "--episodes 2 --duration 1 --workers 1 --out recording",
+    "collect": "--episodes 2 --duration 8 --workers 1 --out recording",
     "data": "recording --picture labels.png",
+    "convert": "recording --validation-share 0.5 --out corl2017",
     "train": "--data recording --steps 2 --batch 2 --history-steps 1 --history-batch 2 --camera-check-steps 1 "
     "--out training",
     "evaluate": "--data recording --model training/model.safetensors --worst worst.png",

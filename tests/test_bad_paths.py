@@ -39,6 +39,7 @@ OUTPUTS: dict[str, tuple[str, ...]] = {
     "replay": ("replay", "run", "x", "--out", "{}.mp4"),
     "collect": ("collect", "--out", "{}"),
     "data": ("data", "run", "--picture", "{}.png"),
+    "convert": ("convert", "run", "--out", "{}"),
     "train": ("train", "--out", "{}"),
     "evaluate": ("evaluate", "--worst", "{}.png"),
     "see": ("see", "run", "--out", "{}.mp4"),

@@ -6,19 +6,22 @@ import math
 import os
 import shutil
 import signal
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from caldrive.collection import collect as collection
-from caldrive.collection.collect import _record, collect
+from caldrive.collection.collect import _record, _record_bytes, collect
 from caldrive.collection.config import CollectConfig
 from caldrive.datatypes import Control
 from caldrive.files import locked_folder
 from caldrive.world.embedded import EmbeddedWorld
+from tests.parallel import fake_ray
 
 TINY = CollectConfig(
     "town02",
@@ -193,6 +196,45 @@ def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(
     monkeypatch.setattr(collection, "_record", _dies_once)
     list(collect(TINY, tmp_path, workers=2))
     assert contents(tmp_path) == contents(unbroken)
+
+
+def test_machines_without_a_common_disk_record_the_same_bytes(
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ray = fake_ray.install(monkeypatch, processors=1)
+    assert sorted(k for k, _ in collect(TINY, tmp_path, ray="auto")) == [0, 1, 2]
+    assert contents(tmp_path) == contents(unbroken)
+    assert ray.address == "auto"
+
+
+@pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
+def test_rays_workers_record_the_same_bytes(unbroken: Path, tmp_path: Path) -> None:
+    assert sorted(k for k, _ in collect(TINY, tmp_path, workers=2, ray="local")) == [0, 1, 2]
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_recording_on_a_cluster_that_is_broken_off_goes_on(
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ray = fake_ray.install(monkeypatch, processors=1)
+    recording = collect(TINY, tmp_path, ray="auto")
+    first, _ = next(recording)
+    recording.close()  # type: ignore[attr-defined]
+    assert not ray.is_running
+    assert sorted(k for k, _ in collect(TINY, tmp_path)) == sorted({0, 1, 2} - {first})
+    assert contents(tmp_path) == contents(unbroken)
+
+
+def test_a_machine_of_the_cluster_with_other_code_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"found behaviour-\d+ on a machine of the cluster, wanted another"):
+        _record_bytes(TINY, "another", 0)
+
+
+def test_without_ray_nothing_is_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(RuntimeError, match=r"pip install 'caldrive\[ray\]'"):
+        next(collect(TINY, tmp_path / "new", ray="local"))
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_town_that_only_judges_is_not_recorded(tmp_path: Path) -> None:

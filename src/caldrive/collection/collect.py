@@ -1,16 +1,18 @@
 """A folder of recorded episodes, and who fills it.
 
 Every episode depends on (seed, its number) only, so that a recording that was interrupted goes on and ends with the
-same files as an unbroken one.
+same files as an unbroken one, on however many machines. Those of a Ray cluster may share no disk: they send an
+episode's file as bytes, about 3 MB for 12 s, and this machine writes it.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import lru_cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from caldrive.checks import MOST_PIXELS, MOST_SEED, MOST_WORKERS, Limits, require_limits
@@ -20,6 +22,7 @@ from caldrive.driving.setup import make_world
 from caldrive.files import locked_folder, write_whole
 from caldrive.interfaces import RecordableWorld, is_recordable
 from caldrive.parallel.processes import parallel_map
+from caldrive.parallel.ray_cluster import cluster_map, require_ray
 from caldrive.progress import Progress, silent
 from caldrive.provenance import code_version
 from caldrive.recordings.folder import Manifest, read_manifest
@@ -39,18 +42,25 @@ LIMITS: Limits = {  # of the options that are numbers
 
 
 def collect(
-    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent
+    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent, ray: str | None = None
 ) -> Iterator[tuple[int, int]]:
     """Records what is missing or damaged in a folder; yields (episode, frames) as they are done.
 
-    Where a worker dies, new ones go on. Raises ValueError where the folder holds a recording with other settings or
-    another process records in it, RuntimeError where workers die again and again.
+    ray: address of a cluster that records, as in `cluster_map`; None for processes of this machine. Where a worker
+    dies, new ones go on. Raises ValueError where the folder holds a recording with other settings, another process
+    records in it or a machine of the cluster has another caldrive, RuntimeError where workers die again and again or
+    Ray is missing.
     """
     _check(config, workers)
+    if ray is not None:
+        require_ray()
     with locked_folder(folder):
         _claim(folder, config)
         missing = list(_missing(config.episodes, folder, progress))
-        recorded = parallel_map(partial(_record, config, folder), missing, workers)
+        if ray is None:
+            recorded = parallel_map(partial(_record, config, folder), missing, workers)
+        else:
+            recorded = _record_elsewhere(config, folder, missing, workers, ray)
         try:
             for done, episode in enumerate(recorded, start=config.episodes - len(missing) + 1):
                 progress(f"recording, {done} of {config.episodes} episodes", done / config.episodes)
@@ -89,6 +99,27 @@ def _close_world() -> None:
 def _record(config: CollectConfig, folder: Path, number: int) -> int:
     """What a worker does: records an episode, and returns its number of frames."""
     return record_episode(_world(), config, number, folder)
+
+
+def _record_elsewhere(
+    config: CollectConfig, folder: Path, numbers: Sequence[int], workers: int, ray: str
+) -> Iterator[tuple[int, int]]:
+    """What `parallel_map` does with `_record`, by Ray's workers."""
+    for number, (frames, content) in cluster_map(partial(_record_bytes, config, code_version()), numbers, workers, ray):
+        write_whole(episode_path(folder, number), content)
+        yield number, frames
+
+
+def _record_bytes(config: CollectConfig, code: str, number: int) -> tuple[int, bytes]:
+    """What one of Ray's workers does: records an episode, and returns its number of frames and its file. Raises
+    ValueError where this machine's code is another than `code`."""
+    if code_version() != code:
+        raise ValueError(
+            f"found {code_version()} on a machine of the cluster, wanted {code}: install the same caldrive there"
+        )
+    with TemporaryDirectory() as folder:
+        frames = _record(config, Path(folder), number)
+        return frames, episode_path(Path(folder), number).read_bytes()
 
 
 def _check(config: CollectConfig, workers: int) -> None:

@@ -15,7 +15,7 @@ from tyro.conf import subcommand
 
 from caldrive.commands.answer import Answer
 from caldrive.commands.benchmark import Benchmark, Replay, Report
-from caldrive.commands.collect import Collect, Data
+from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
 from caldrive.commands.explain import Blame
 from caldrive.commands.see import See
@@ -42,6 +42,7 @@ VERBS: Mapping[str, Verb] = {
     "blame": Verb(Blame, "Say which affordance is to blame for a benchmark's failures."),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
+    "convert": Verb(Convert, "Write a recording in a format that others' code reads."),
     "train": Verb(Train, "Train an agent's network on a recording."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),

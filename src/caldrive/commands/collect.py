@@ -1,10 +1,10 @@
-"""The verbs of a recording: record what the oracle drives, and check what was recorded."""
+"""The verbs of a recording: record what the oracle drives, check what was recorded, and give it to others."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from tyro.conf import arg
@@ -22,7 +22,9 @@ class Collect(Configurable):
     out: Path = Path("out/recording")
     """Folder for the episodes."""
     workers: int = 2
-    """Processes that record at the same time."""
+    """Processes that record at the same time, here or with --ray local; a cluster uses all its processors."""
+    ray: str | None = None
+    """Record with Ray: local, auto for the cluster that this machine belongs to, or a cluster's address."""
 
     def run(self, progress: Progress) -> Answer:
         """Records what is missing; answers with the counts of labels."""
@@ -34,7 +36,7 @@ class Collect(Configurable):
         from caldrive.recordings.writer import episode_path
 
         require_writable_folder(self.out)
-        for _ in collect(self.recording, self.out, self.workers, progress):
+        for _ in collect(self.recording, self.out, self.workers, progress, self.ray):
             pass
         paths = (episode_path(self.out, k) for k in range(self.recording.episodes))
         counts = class_counts([read_episode(path, images=False) for path in paths])
@@ -64,3 +66,31 @@ class Data(Output):
         picture = self.picture if episodes else None
         values = asdict(found) | {"picture": str(picture) if picture else None}
         return Answer(values, recording_table(found, picture), int(bool(found.damaged)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convert(Output):
+    """Write a recording in a format that others' code reads; files that are there already are kept."""
+
+    to: Literal["corl2017"] = "corl2017"
+    """corl2017: the HDF5 files of the CARLA paper's imitation data, in folders SeqTrain and SeqVal. Images have to be
+    200 x 88."""
+    out: Path = Path("out/corl2017")
+    """Folder for the files."""
+    validation_share: float = 0.2
+    """Share of the episodes that goes to SeqVal."""
+    seed: int = 0
+    """Decides which episodes go there."""
+
+    folder: tyro.conf.Positional[Path] = Path("out/recording")
+    """Folder with the recorded episodes."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Writes what is missing; answers with how much there is."""
+        from caldrive.checks import require_writable_folder
+        from caldrive.recordings.corl2017_writer import write_corl2017
+
+        require_writable_folder(self.out)
+        written = write_corl2017(self.folder, self.out, self.validation_share, self.seed, progress)
+        shown = f"{self.out}: {written.frames} frames in {written.files} files; {written.left_out} fill no further file"
+        return Answer({"out": str(self.out)} | asdict(written), shown)

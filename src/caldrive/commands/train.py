@@ -70,7 +70,7 @@ class TrainImitation(Configurable):
     agent: Literal["cil"] = field(default="cil", metadata=TYPED)
     """Whose network."""
     data: Path = Path("out/recording")
-    """Folder with the recorded episodes."""
+    """Folder with the recorded episodes, or with SeqTrain and SeqVal of HDF5 files (CORL-2017)."""
     out: Path = Path("out/imitation")
     """Folder for model.safetensors, the state of the run, its metrics and their curves."""
     preset: str = "published"

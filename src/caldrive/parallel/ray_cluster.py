@@ -1,8 +1,13 @@
-"""Work spread over one machine or many through Ray (the extra `ray`). A worker that dies is replaced."""
+"""Work spread over one machine or many through Ray (the extra `ray`). A worker that dies is replaced.
+
+Results wait in the memory of Ray's object store until they are taken. So no more jobs are under way at a time than keep
+every processor busy: where whoever takes the results is slow, the workers wait for it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from typing import Any, TypeVar
 
 from caldrive.parallel.processes import MAX_DEATHS, tune_process
@@ -11,6 +16,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 LOCAL = "local"  # in the place of an address: Ray on this machine alone
+JOBS_PER_PROCESSOR = 2  # under way: one that is done, and one that follows it at once
 
 
 def cluster_map(
@@ -26,8 +32,11 @@ def cluster_map(
     _connect(ray, address, workers)
     try:
         remote = ray.remote(max_retries=MAX_DEATHS, num_cpus=1)(_call)
-        jobs = {remote.remote(work, item): item for item in items}
-        while jobs:
+        waiting, jobs = iter(items), dict[Any, Item]()
+        while True:
+            jobs |= {remote.remote(work, item): item for item in islice(waiting, _most_jobs(ray) - len(jobs))}
+            if not jobs:
+                break
             done, _ = ray.wait(list(jobs), num_returns=1)
             yield jobs.pop(done[0]), ray.get(done[0])
     except ray.exceptions.RayTaskError as error:
@@ -47,6 +56,11 @@ def require_ray() -> Any:
     except ImportError as error:
         raise RuntimeError("found no Ray, wanted it for --ray: type pip install 'caldrive[ray]'") from error
     return ray
+
+
+def _most_jobs(ray: Any) -> int:
+    """How many jobs may be under way. Asked each time, because machines may join a cluster, or leave it."""
+    return max(1, int(JOBS_PER_PROCESSOR * ray.cluster_resources().get("CPU", 1)))
 
 
 def _call(work: Callable[[Item], Result], item: Item) -> Result:

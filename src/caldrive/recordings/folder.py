@@ -30,6 +30,11 @@ class Manifest(TypedDict):
 def episode_paths(folder: Path | str) -> list[Path]:
     """The files of a folder's episodes by name. Raises EpisodeError where there is none."""
     paths = sorted(Path(folder).glob("**/*.parquet"))
+    if not paths and any(Path(folder).glob("**/*.h5")):
+        raise EpisodeError(
+            f"found HDF5 files in {folder}, which say nothing of affordances, wanted episodes (*.parquet): record some "
+            "with `caldrive collect`"
+        )
     if not paths:
         raise EpisodeError(f"there is no episode (*.parquet) in {folder}: record some with `caldrive collect`")
     return paths

@@ -7,8 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from caldrive.agents.conditional_imitation.labels import CommandSampler, DrivenFrames, corrected_steer, driven_frames
+from caldrive.agents.conditional_imitation.labels import (
+    Camera,
+    CommandSampler,
+    Demonstrations,
+    corrected_steer,
+    recorded_demonstrations,
+)
 from caldrive.control.controller import CALController
 from caldrive.control.lateral import LateralConfig
 from caldrive.datatypes import Affordances, Command
@@ -18,15 +25,19 @@ from caldrive.recordings.folder import find_episodes
 from tests.perception.data import HEIGHT, WIDTH, record
 
 
-def one(*values: float) -> tuple[np.ndarray, ...]:
-    return tuple(np.array([value]) for value in values)
+def corrected(steer: float, left: float, yaw: float, speed: float) -> NDArray[np.float64]:
+    """The label of one frame under the command straight."""
+    law, (one, aside, turned, fast) = LateralConfig(), (np.array([value]) for value in (steer, left, yaw, speed))
+    return corrected_steer(one, Camera(aside, turned), fast, np.array([law.straight[0]]), law.max_angle)
 
 
-def frames_of(commands: list[int], steer: list[float]) -> DrivenFrames:
+def frames_of(commands: list[int], steer: list[float]) -> Demonstrations:
     n = len(commands)
     controls = np.stack([np.array(steer), np.zeros(n), np.zeros(n)], axis=1)
     images = np.zeros((n, 4, 4, 3), np.uint8)
-    return DrivenFrames(np.zeros(n), np.array(commands), controls, lambda ids: images[ids], lambda ids: None, "digest")
+    return Demonstrations(
+        np.zeros(n), np.array(commands), controls, lambda ids: images[ids], lambda ids: None, "digest"
+    )
 
 
 @pytest.mark.parametrize(("left", "yaw"), [(0.5, 0.0), (-0.5, 0.1), (0.0, -0.2)])
@@ -34,19 +45,19 @@ def test_the_label_of_a_camera_aside_is_what_the_driver_would_do_there(left: flo
     # On a straight road, in the middle of the lane: the car that stands where the camera does lies aside and is turned.
     there = Affordances(relative_angle=-yaw, center_distance=-left)
     wanted = CALController().step(there, 5.0, Command.STRAIGHT).control.steer
-    label = corrected_steer(*one(0.0, left, yaw, 5.0, LateralConfig().straight[0]))
+    label = corrected(0.0, left, yaw, 5.0)
     assert label[0] == pytest.approx(wanted, abs=0.12 * abs(wanted))  # of which the damping takes a tenth
 
 
 def test_a_label_is_never_more_than_the_wheel_can_do() -> None:
-    assert corrected_steer(*one(0.9, -0.5, -math.pi / 4, 0.0, 1.0))[0] == 1.0
+    assert corrected(0.9, -0.5, -math.pi / 4, 0.0)[0] == 1.0
 
 
 def test_the_clean_control_is_learnt_and_never_the_disturbed_one(tmp_path: Path) -> None:
     frames = Frames(find_episodes(record(tmp_path, n_cameras=1)), (HEIGHT, WIDTH))
-    driven = driven_frames(frames)
+    driven = recorded_demonstrations(frames, LateralConfig().max_angle)
     assert frames.column("driven_steer")[0] == -0.2
-    straight = corrected_steer(*one(0.1, 0.0, 0.1, 5.0, 1.0))
+    straight = corrected(0.1, 0.0, 0.1, 5.0)
     np.testing.assert_allclose(driven.controls, np.tile([straight[0], 0.5, 0.0], (len(frames), 1)))
 
 

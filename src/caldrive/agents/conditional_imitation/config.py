@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from caldrive.checks import MOST_PIXELS, require_limits
+from caldrive.checks import MOST_PIXELS, require_limits, require_within
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
 from caldrive.perception.network.config import CELL, MOST_NODES
 from caldrive.perception.training.config import LoopConfig, usual
@@ -86,6 +86,9 @@ class ImitationConfig(LoopConfig):
     inverse proportion to the frequency of their steering."""
     weights: ImitationWeights = ImitationWeights()
     """What each squared error counts."""
+    wheel_angle: float = 35.0
+    """Angle of the front wheels at full steering, degrees, of the car that was recorded; of CARLA's 70. The labels of
+    cameras aside depend on it."""
     published_augmentation: bool = True
     """The augmentation that the authors of the released agent posted, in the place of CAL's."""
     recolour: RecolourConfig = RecolourConfig(enabled=False)
@@ -93,6 +96,7 @@ class ImitationConfig(LoopConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_within("--wheel-angle", self.wheel_angle, 1.0, 90.0, 35.0)
         if self.published_augmentation and self.recolour.enabled:
             raise ValueError(
                 "found the published augmentation beside CAL's recolouring, wanted one of them: type "

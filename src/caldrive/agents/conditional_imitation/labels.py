@@ -8,6 +8,7 @@ degrees and cameras turned by 30 (coiltraine: 6 / pi * arctan(0.52 * 6 / v), at 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from caldrive.control.lateral import LateralConfig
 from caldrive.perception.dataset.frames import Frames, Ids
 from caldrive.perception.network.network import COMMANDS
+from caldrive.recordings.corl2017 import DrivenFrames
 
 Numbers = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -25,8 +27,8 @@ GAINS = np.array([getattr(LAW, command.value)[0] for command in COMMANDS])  # 1/
 
 
 @dataclass(frozen=True)
-class DrivenFrames:
-    """Frames (N,) of somebody's driving: what an imitation learns from, wherever it was recorded."""
+class Demonstrations:
+    """N frames of somebody's driving: what an imitation learns from, wherever it was recorded."""
 
     speed: Numbers
     """(N,), m/s."""
@@ -45,24 +47,46 @@ class DrivenFrames:
         return len(self.speed)
 
 
-def corrected_steer(steer: Numbers, left: Numbers, yaw: Numbers, speed: Numbers, gain: Numbers) -> Numbers:
+@dataclass(frozen=True)
+class Camera:
+    """Where the cameras of N frames are: m to the left of the car's middle, and rad to the left."""
+
+    left: Numbers
+    yaw: Numbers
+
+
+def corrected_steer(steer: Numbers, camera: Camera, speed: Numbers, gain: Numbers, wheel: float) -> Numbers:
     """The steering (N,), in [-1, 1] and + to the left, for a car that stands at the camera's place.
 
-    steer: for the car where it is; left: of the camera, m; yaw: its turn to the left, rad; speed: m/s; gain: of the
-    driver's law, 1/s.
+    steer: for the car where it is; speed: m/s; gain: of the driver's law, 1/s; wheel: angle of the front wheels at full
+    steering, rad.
     """
-    angle = -yaw - np.arctan(gain * left / np.maximum(speed, LAW.speed_floor))
-    return np.clip(steer + angle / LAW.max_angle, -1.0, 1.0)
+    angle = -camera.yaw - np.arctan(gain * camera.left / np.maximum(speed, LAW.speed_floor))
+    return np.clip(steer + angle / wheel, -1.0, 1.0)
 
 
-def driven_frames(frames: Frames) -> DrivenFrames:
-    """What an imitation learns from a recording's frames."""
+def recorded_demonstrations(frames: Frames, wheel: float) -> Demonstrations:
+    """What an imitation learns from a recording's frames. wheel: as in `corrected_steer`."""
     speed, command = frames.column("speed"), frames.command
     clean = [frames.column(f"clean_{name}") for name in ("steer", "throttle", "brake")]
-    left, yaw = frames.column("camera_left"), frames.column("camera_yaw")
-    steer = corrected_steer(clean[0], left, yaw, speed, GAINS[command])
+    camera = Camera(frames.column("camera_left"), frames.column("camera_yaw"))
+    steer = corrected_steer(clean[0], camera, speed, GAINS[command], wheel)
     controls = np.stack([steer, *clean[1:]], axis=1)
-    return DrivenFrames(speed, command, controls, frames.images, frames.semantics, frames.digest)
+    return Demonstrations(speed, command, controls, frames.images, frames.semantics, frames.digest)
+
+
+def corl2017_demonstrations(frames: DrivenFrames, wheel: float) -> Demonstrations:
+    """What an imitation learns from HDF5 files. wheel: as in `corrected_steer`, of CARLA's car 70 degrees."""
+    throttle, brake, steer = frames.control.T
+    camera = Camera(frames.camera_left, frames.camera_yaw)
+    corrected = corrected_steer(steer, camera, frames.speed, GAINS[frames.command], wheel)
+    controls = np.stack([corrected, throttle, brake], axis=1)
+    digest = hashlib.sha256(repr([(path.name, path.stat().st_size) for path in frames.files]).encode())
+    for values in (frames.speed, frames.command, controls):
+        digest.update(values.tobytes())
+    return Demonstrations(
+        frames.speed, frames.command, controls, frames.images, lambda ids: None, digest.hexdigest()[:16]
+    )
 
 
 # Edges of the classes in which the size of the steering is balanced, where it is.
@@ -77,7 +101,7 @@ class CommandSampler:
     ValueError where a command never occurs.
     """
 
-    def __init__(self, frames: DrivenFrames, balance: float, seed: int) -> None:
+    def __init__(self, frames: Demonstrations, balance: float, seed: int) -> None:
         self.seed, self._ids, self._cumulative = seed, list[Ids](), list[Numbers]()
         steer = np.digitize(np.abs(frames.controls[:, 0]), STEER_EDGES)
         for number, command in enumerate(COMMANDS):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,7 +16,12 @@ from torch import Generator, Tensor, nn
 from caldrive.agents.conditional_imitation.augmentation import augment_as_published
 from caldrive.agents.conditional_imitation.checkpoint import ImitationInfo, round_to_bytes, save_imitation
 from caldrive.agents.conditional_imitation.config import ImitationConfig, ImitationNetworkConfig, ImitationWeights
-from caldrive.agents.conditional_imitation.labels import CommandSampler, DrivenFrames, driven_frames
+from caldrive.agents.conditional_imitation.labels import (
+    CommandSampler,
+    Demonstrations,
+    corl2017_demonstrations,
+    recorded_demonstrations,
+)
 from caldrive.agents.conditional_imitation.network import OUTPUTS, SPEED_SCALE, ImitationNetwork
 from caldrive.perception.dataset.augmentation import augmented
 from caldrive.perception.dataset.frames import Ids
@@ -27,6 +33,7 @@ from caldrive.perception.training.distributed import join_process_group
 from caldrive.perception.training.folder import TrainingFolder
 from caldrive.perception.training.loop import Stop, never, read_frames, run_training
 from caldrive.progress import Progress, silent
+from caldrive.recordings.corl2017 import FOLDERS, HEIGHT, WIDTH, read_corl2017
 from caldrive.recordings.folder import episode_paths
 
 FRAMES_A_PASS = 64
@@ -41,21 +48,52 @@ def train_imitation(
     progress: Progress = silent,
     stop: Stop = never,
 ) -> Path:
-    """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
+    """Train a network on the episodes in `data`, or on the HDF5 files in its SeqTrain and SeqVal; returns the finished
+    one's path, `out`/model.safetensors.
 
     `loop.run_training` says what lies in `out`. Raises ValueError for settings or data that cannot be, and where
     another process works in `out`.
     """
     group = join_process_group(config.device, config.batch)
-    episode_paths(data)  # without one, no folder is made
+    is_hdf5 = all((data / name).is_dir() for name in FOLDERS)
+    if not is_hdf5:
+        episode_paths(data)  # without one, no folder is made
 
     def make_learner() -> ImitationLearner:
-        frames = read_frames(config, network.image_size, data)
-        keys = sorted({episode.key for episode in frames.validation.episodes})
-        training, validation = (driven_frames(part) for part in (frames.training, frames.validation))
-        return start(config, network, training, validation, keys, group.device)
+        read = _read_corl2017 if is_hdf5 else _read_recording
+        return start(config, network, read(config, network, data), group.device)
 
     return run_training(make_learner, out, group, progress, stop)
+
+
+@dataclass(frozen=True)
+class ImitationData:
+    """What a training learns from, and what it is measured on."""
+
+    training: Demonstrations
+    validation: Demonstrations
+    validation_keys: tuple[str, ...] = ()
+    """Of the episodes that are kept for validation."""
+
+
+def _read_recording(config: ImitationConfig, network: ImitationNetworkConfig, data: Path) -> ImitationData:
+    """A folder of recorded episodes."""
+    frames, wheel = read_frames(config, network.image_size, data), math.radians(config.wheel_angle)
+    keys = tuple(sorted({episode.key for episode in frames.validation.episodes}))
+    training, validation = (recorded_demonstrations(part, wheel) for part in (frames.training, frames.validation))
+    return ImitationData(training, validation, keys)
+
+
+def _read_corl2017(config: ImitationConfig, network: ImitationNetworkConfig, data: Path) -> ImitationData:
+    """A folder with SeqTrain and SeqVal. Raises ValueError where the network takes images of another size."""
+    if network.image_size != (HEIGHT, WIDTH):
+        raise ValueError(
+            f"found HDF5 files of {WIDTH} x {HEIGHT} pixels in {data}, wanted {network.image_width} x "
+            f"{network.image_height} for the network: leave --network.image-width and --network.image-height out"
+        )
+    wheel = math.radians(config.wheel_angle)
+    training, validation = (corl2017_demonstrations(read_corl2017(data / name), wheel) for name in FOLDERS)
+    return ImitationData(training, validation)
 
 
 def imitation_loss(
@@ -76,9 +114,7 @@ class ImitationLearner:
 
     config: ImitationConfig
     model: ImitationNetwork
-    training: DrivenFrames
-    validation: DrivenFrames
-    validation_keys: list[str]
+    data: ImitationData
     sampler: CommandSampler
     device: str
     figures: tuple[str, ...] = ("loss", *(f"{name}/mae" for name in (*OUTPUTS, "speed")))
@@ -96,26 +132,26 @@ class ImitationLearner:
     @property
     def data_digest(self) -> str:
         """Tells the frames that it learns from from others."""
-        return self.training.digest
+        return self.data.training.digest
 
     def loss(self, step: int, share: slice, forward: nn.Module, generator: Generator) -> Tensor:
         """The loss of a step's frames."""
         ids = self.sampler.draw(step, self.config.batch)[share]
         images = self._images(ids, generator).to(self.device)
-        speed, command, controls = self._targets(self.training, ids)
+        speed, command, controls = self._targets(self.data.training, ids)
         with autocast(self.config.precision, self.device):
             outputs = forward(images, speed, command)
         return imitation_loss(outputs, controls, speed, self.config.weights)
 
     def _images(self, ids: Ids, generator: Generator) -> Tensor:
         """A batch's images (N, 3, H, W) in [0, 1], augmented."""
-        images = self.training.images(ids)
+        images = self.data.training.images(ids)
         if self.config.published_augmentation:
             return augment_as_published(to_float(images), generator)
-        semantics = self.training.semantics(ids) if self.config.recolour.enabled else None
+        semantics = self.data.training.semantics(ids) if self.config.recolour.enabled else None
         return augmented(images, semantics, torch.arange(len(ids)), generator, self.config)
 
-    def _targets(self, frames: DrivenFrames, ids: Ids) -> tuple[Tensor, Tensor, Tensor]:
+    def _targets(self, frames: Demonstrations, ids: Ids) -> tuple[Tensor, Tensor, Tensor]:
         """Speeds (N,), commands (N,) and controls (N, 3) of frames by number."""
         values = (frames.speed[ids].astype(np.float32), frames.command[ids], frames.controls[ids].astype(np.float32))
         speed, command, controls = (torch.from_numpy(value).to(self.device) for value in values)
@@ -127,8 +163,8 @@ class ImitationLearner:
         round_to_bytes(network)
         metrics = self._measure(network)
         data = {
-            "train_frames": len(self.training), "validation_frames": len(self.validation),
-            "validation_episodes": self.validation_keys,
+            "train_frames": len(self.data.training), "validation_frames": len(self.data.validation),
+            "validation_episodes": list(self.data.validation_keys),
         }  # fmt: skip
         info = ImitationInfo(network.config, data, metrics, asdict(self.config), self._ranges(network))
         save_imitation(path, network, info)
@@ -138,13 +174,13 @@ class ImitationLearner:
     def _ranges(self, network: ImitationNetwork) -> tuple[float, ...]:
         """The ranges that driving in integers needs."""
         ids = np.unique(self.sampler.draw(0, RANGE_FRAMES))  # of a small recording the same ones come again and again
-        images = to_float(self.training.images(ids)).to(self.device)
+        images = to_float(self.data.training.images(ids)).to(self.device)
         return input_ranges(network.trunk, network.normalised(images))
 
     @torch.inference_mode()
     def _measure(self, network: ImitationNetwork) -> dict[str, float]:
         """Mean errors on the frames kept for validation: all together, and of the steering for each command."""
-        frames = self.validation
+        frames = self.data.validation
         parts = np.array_split(np.arange(len(frames)), max(1, len(frames) // FRAMES_A_PASS))
         outputs = [self._outputs(network, frames, ids) for ids in parts]
         controls, speed = (torch.cat(part) for part in zip(*outputs, strict=True))
@@ -158,7 +194,7 @@ class ImitationLearner:
         figures["loss"] = float(imitation_loss((controls, speed), wanted, wanted_speed, self.config.weights))
         return figures
 
-    def _outputs(self, network: ImitationNetwork, frames: DrivenFrames, ids: Ids) -> tuple[Tensor, Tensor]:
+    def _outputs(self, network: ImitationNetwork, frames: Demonstrations, ids: Ids) -> tuple[Tensor, Tensor]:
         """What a network makes of frames by number."""
         speed, command, _ = self._targets(frames, ids)
         with autocast(self.config.precision, self.device):
@@ -177,13 +213,11 @@ class ImitationLearner:
 def start(
     config: ImitationConfig,
     network: ImitationNetworkConfig,
-    training: DrivenFrames,
-    validation: DrivenFrames,
-    validation_keys: list[str],
+    data: ImitationData,
     device: str,
 ) -> ImitationLearner:
     """What learns, before its first step."""
     torch.manual_seed(config.seed)
     model = ImitationNetwork(network).to(device)
-    sampler = CommandSampler(training, config.balance, config.seed)
-    return ImitationLearner(config, model, training, validation, validation_keys, sampler, device)
+    sampler = CommandSampler(data.training, config.balance, config.seed)
+    return ImitationLearner(config, model, data, sampler, device)

@@ -1,0 +1,51 @@
+"""Imitation learns from HDF5 files what it learns from the recording that they were written from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from caldrive.agents.conditional_imitation.checkpoint import load_imitation
+from caldrive.agents.conditional_imitation.labels import corl2017_demonstrations, recorded_demonstrations
+from caldrive.agents.conditional_imitation.learner import train_imitation
+from caldrive.control.lateral import LateralConfig
+from caldrive.perception.dataset.frames import Frames
+from caldrive.recordings.corl2017 import read_corl2017
+from caldrive.recordings.corl2017_writer import write_corl2017
+from caldrive.recordings.folder import find_episodes, split
+from tests.agents.conditional_imitation.data import SHORT, SMALL
+from tests.recordings.test_corl2017 import record_drive
+
+WHEEL = LateralConfig().max_angle
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A recording, and the same as HDF5."""
+    recording, written = (tmp_path_factory.mktemp(name) for name in ("recording", "written"))
+    write_corl2017(record_drive(recording), written, validation_share=0.25)
+    return recording, written
+
+
+def test_the_labels_are_those_of_the_recording(folders: tuple[Path, Path]) -> None:
+    recording, written = folders
+    validation = split(find_episodes(recording), 0.25, 0)[1]
+    recorded = recorded_demonstrations(Frames(validation, (88, 200)), WHEEL)
+    read = corl2017_demonstrations(read_corl2017(written / "SeqVal"), WHEEL)
+    n = len(read)
+    same = read.command == recorded.command[:n]  # far from junctions the files have no command, and so another gain
+    assert same.mean() > 0.3
+    np.testing.assert_allclose(read.controls[same], recorded.controls[:n][same], atol=1e-6)
+    np.testing.assert_allclose(read.speed, recorded.speed[:n], atol=1e-5)
+    np.testing.assert_array_equal(read.images(np.arange(3)), recorded.images(np.arange(3)))
+
+
+def test_hdf5_files_train_the_network(folders: tuple[Path, Path], tmp_path: Path) -> None:
+    network = replace(SMALL, image_width=200, image_height=88)
+    _, info = load_imitation(train_imitation(replace(SHORT, steps=2), folders[1], tmp_path, network))
+    assert (info.data["train_frames"], info.data["validation_frames"]) == (600, 200)
+    with pytest.raises(ValueError, match=r"found HDF5 files of 200 x 88 pixels in .*wanted 64 x 32 for the network"):
+        train_imitation(SHORT, folders[1], tmp_path / "other", SMALL)
