@@ -53,12 +53,13 @@ def read_manifest(path: Path) -> Manifest:
         ) from error
 
 
-def find_episodes(folder: Path | str, semantic: bool = False) -> list[Episode]:
-    """All episodes of a folder by name; semantic: with their semantic images, where they have them.
+def find_episodes(folder: Path | str, semantic: bool = False, images: bool = True) -> list[Episode]:
+    """All episodes of a folder by name; semantic: with their semantic images, where they have them; images: with those
+    of the camera.
 
     Raises EpisodeError where there is none, one is damaged, or one is there twice.
     """
-    episodes = [read_episode(path, semantic) for path in episode_paths(folder)]
+    episodes = [read_episode(path, semantic, images) for path in episode_paths(folder)]
     if sentences := duplicates(episodes):
         raise EpisodeError(sentences[0])
     return episodes

@@ -80,6 +80,16 @@ def test_recurrent_blocks_pass_torch() -> None:
         CompiledBlocks(network)
 
 
+@pytest.mark.parametrize("conditioning", ["input", "all"])
+def test_blocks_without_groups_for_the_commands_pass_torch(conditioning: Any) -> None:
+    network = network_with(BlockConfig("dense", 8, conditioning=conditioning))
+    engine = blocks_engine("int7", network)
+    angles = [engine(history(network), command)["relative_angle"].item() for command in range(len(COMMANDS))]
+    assert len(set(angles)) == len(COMMANDS)
+    with pytest.raises(ValueError, match="found task blocks without groups for the commands"):
+        CompiledBlocks(network)
+
+
 def test_only_beside_a_backbone_in_integers_they_are_compiled() -> None:
     network = network_with(BLOCKS[2])
     assert not isinstance(blocks_engine("fp32", network), CompiledBlocks)

@@ -3,15 +3,16 @@ from __future__ import annotations
 import pickle
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, get_args
 
 import pytest
 import torch
 from safetensors.torch import save_file
 
-from caldrive.affordances import BY_NAME, SPECS
+from caldrive.affordances import BY_NAME, SPECS, AffordanceSpec
 from caldrive.perception.network.backbone import CHANNELS, IMAGENET_LAYERS, Backbone
 from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
-from caldrive.perception.network.config import NETWORKS, BlockConfig, Layer, NetworkConfig, Norm
+from caldrive.perception.network.config import NETWORKS, BlockConfig, Conditioning, Layer, NetworkConfig, Norm
 from caldrive.perception.network.network import Network, NodeGroup, TaskBlock
 from tests.perception.data import TINY
 
@@ -113,6 +114,41 @@ def test_in_a_mixed_batch_a_group_learns_from_its_own_samples_only() -> None:
     block(features[command[:, 0] == 0], command[command[:, 0] == 0]).sum().backward()
     for gradient, expected in zip(mixed, (p.grad for p in block.groups[0].parameters()), strict=True):
         torch.testing.assert_close(gradient, expected)
+
+
+def conditioned(conditioning: Any, spec: AffordanceSpec = ANGLE) -> TaskBlock:
+    torch.manual_seed(0)
+    return TaskBlock(BlockConfig("gru", 6, 0.0, length=3, norm="layer", conditioning=conditioning), spec, F).eval()
+
+
+@pytest.mark.parametrize("conditioning", get_args(Conditioning))
+def test_the_command_counts_wherever_it_comes_in(conditioning: str) -> None:
+    block, features = conditioned(conditioning), torch.randn(1, 3, F)
+    together = block(features.expand(3, 3, F), torch.arange(3)[:, None])
+    assert together.unique().numel() == 3
+    for number in range(3):
+        alone = block(features, torch.tensor([[number]]))
+        torch.testing.assert_close(together[number : number + 1], alone)
+
+
+@pytest.mark.parametrize("conditioning", get_args(Conditioning))
+def test_an_affordance_that_no_command_changes_knows_no_conditioning(conditioning: str) -> None:
+    block, plain = conditioned(conditioning, HAZARD), conditioned("groups", HAZARD)
+    features, command = torch.randn(2, 3, F), torch.tensor([[0], [2]])
+    torch.testing.assert_close(block(features, command), plain(features, command))
+
+
+def test_of_the_values_for_all_commands_only_the_chosen_one_learns() -> None:
+    block = conditioned("all")
+    block(torch.randn(4, 3, F), torch.full((4, 1), 2)).sum().backward()
+    gradient = block.group(0).output.weight.grad
+    assert gradient is not None
+    assert gradient.abs().sum(1).gt(0).tolist() == [False, False, True]
+
+
+def test_an_unknown_conditioning_is_named() -> None:
+    with pytest.raises(ValueError, match="found conditioning 'wheel' of a task block, wanted groups, input or all"):
+        BlockConfig(conditioning="wheel")  # type: ignore[arg-type]
 
 
 def test_all_six_affordances_come_out_for_each_frame() -> None:

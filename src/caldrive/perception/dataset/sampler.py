@@ -38,12 +38,13 @@ class Sampler:
     """Draws training windows: the rarer the rarest class or command in it, the likelier a window.
 
     Hazards, red lights and signs fill a few percent of a drive; drawn evenly, most batches would hold none. What step k
-    draws depends on (seed, k) only, so a run can be taken up anywhere.
+    draws depends on (seed, k) only, so a run can be taken up anywhere. starts: the frames that may begin a window;
+    without them all that do.
     """
 
-    def __init__(self, frames: Frames, window: int, balance: float, seed: int) -> None:
+    def __init__(self, frames: Frames, window: int, balance: float, seed: int, starts: Ids | None = None) -> None:
         self.frames, self.window, self.seed = frames, window, seed
-        self.starts = frames.window_starts(window)
+        self.starts = frames.window_starts(window) if starts is None else starts
         if not len(self.starts):
             raise EpisodeError(
                 f"found no stream of frames that is {window} long, wanted one: record longer episodes, or type a "

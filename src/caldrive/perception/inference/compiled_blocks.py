@@ -43,13 +43,15 @@ class Group(NamedTuple):
 
 class CompiledBlocks:
     """The task blocks of a trained network when driving. Raises ValueError for a block that does not pass here, see
-    `LAYERS`."""
+    `passes`."""
 
     def __init__(self, network: Network) -> None:
         blocks = network.task_blocks()
         if unknown := {block.config.layer for block in blocks.values()} - set(LAYERS):
             layers = ", ".join(sorted(unknown))
             raise ValueError(f"found task blocks of {layers}, wanted {' or '.join(LAYERS)}: type --precision fp32")
+        if not all(map(passes, blocks.values())):
+            raise ValueError("found task blocks without groups for the commands, wanted groups: type --precision fp32")
         self._groups = [
             {name: _group(block, block.group(command), network.span) for name, block in blocks.items()}
             for command in range(len(COMMANDS))
@@ -63,6 +65,11 @@ class CompiledBlocks:
             outputs[name] = np.empty((1, len(group.output)), np.float32)
             _pass(history, group, hidden, outputs[name][0])
         return outputs
+
+
+def passes(block: TaskBlock) -> bool:
+    """Whether the compiled loop has what a block is built from."""
+    return block.config.layer in LAYERS and block.conditioning in ("groups", None)
 
 
 def _group(block: TaskBlock, group: NodeGroup, span: int) -> Group:

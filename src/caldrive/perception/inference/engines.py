@@ -12,7 +12,7 @@ from torch import Tensor
 from caldrive.compiled import Floats
 from caldrive.datatypes import Image
 from caldrive.perception.images import normalise, to_float
-from caldrive.perception.inference.compiled_blocks import LAYERS, CompiledBlocks
+from caldrive.perception.inference.compiled_blocks import CompiledBlocks, passes
 from caldrive.perception.network.camera_check import CameraCheck
 from caldrive.perception.network.network import Network
 
@@ -86,8 +86,8 @@ def eyes_engine(
 
 
 def blocks_engine(precision: str, network: Network) -> BlocksEngine:
-    """The task blocks when driving: beside a backbone in integers as one compiled loop, where it has their layers."""
-    if precision in INTEGERS and all(block.config.layer in LAYERS for block in network.task_blocks().values()):
+    """The task blocks when driving: beside a backbone in integers as one compiled loop, where they pass there."""
+    if precision in INTEGERS and all(map(passes, network.task_blocks().values())):
         return CompiledBlocks(network)
 
     @torch.inference_mode()

@@ -33,11 +33,16 @@ def _with_prior(network: Network, counts: Counts, sign: float) -> Network:
     """A copy whose biases have the logarithms of the classes' shares added (sign 1) or taken away (-1)."""
     network = copy.deepcopy(network)
     for name, count in counts.items():
-        frames = torch.tensor(count, dtype=torch.float64)
-        prior = (frames / frames.sum()).clamp(min=1e-9).log()  # what never occurs is not expected
         bias = network.get_parameter(f"blocks.{name}.groups.0.output.bias")
-        bias.data += sign * (prior - prior[0]).to(bias.device)
+        bias.data += sign * prior(count).to(bias.device)
     return network
+
+
+def prior(count: Sequence[int]) -> Tensor:
+    """What calibration adds to the logits (K,) of classes that have so many frames."""
+    frames = torch.tensor(count, dtype=torch.float64)
+    logarithms = (frames / frames.sum()).clamp(min=1e-9).log()  # what never occurs is not expected
+    return logarithms - logarithms[0]
 
 
 @torch.no_grad()

@@ -12,6 +12,7 @@ from caldrive.checks import MOST_PIXELS
 
 Layer = Literal["dense", "lstm", "gru", "tconv"]
 Norm = Literal["batch", "layer", "none"]
+Conditioning = Literal["groups", "input", "all"]
 
 CELL = 32  # pixels a side that the backbone makes one place of; of a smaller image nothing is left
 MOST_FRAMES, MOST_NODES, MOST_WIDTH = 1000, 10_000, 10.0  # more than anyone builds
@@ -24,7 +25,7 @@ class BlockConfig:
     layer: Layer = "dense"
     """Its layer; tconv is a temporal convolution."""
     nodes: int = 64
-    """Nodes of the layer; as many for each command where the affordance depends on the command."""
+    """Nodes of the layer; as many for each command where there are groups of nodes for the commands."""
     dropout: float = 0.25
     """Share of the nodes that dropout switches off in training."""
     length: int = 1
@@ -35,11 +36,16 @@ class BlockConfig:
     """Norm after the layer: batch; layer, over a sample's nodes, for conditional blocks, as batch norm would see only
     the few samples of a batch that have their command; or none. Without a norm the nodes of a small network die one by
     one: features are never negative, and a few steps at its high rate push all of a node's sums below zero for good."""
+    conditioning: Conditioning = "groups"
+    """Where the command comes in, in a block whose affordance depends on it (section 3.1 and supplement 1.3): groups of
+    nodes, of which it switches one on; input, beside the features; or all, in the controller, for which one group
+    of nodes predicts the values of all three commands."""
 
     def __post_init__(self) -> None:
-        for name, kinds in (("layer", get_args(Layer)), ("norm", get_args(Norm))):
-            if getattr(self, name) not in kinds:
-                raise ValueError(f"found {name} {getattr(self, name)!r} of a task block, wanted {_either(kinds)}")
+        for name, words in (("layer", Layer), ("norm", Norm), ("conditioning", Conditioning)):
+            if getattr(self, name) not in get_args(words):
+                wanted = _either(get_args(words))
+                raise ValueError(f"found {name} {getattr(self, name)!r} of a task block, wanted {wanted}")
         within = 1 <= self.length <= MOST_FRAMES and 1 <= self.dilation <= MOST_FRAMES and 1 <= self.nodes <= MOST_NODES
         if not within or not 0 <= self.dropout < 1:
             raise ValueError(

@@ -72,14 +72,19 @@ class NodeGroup(nn.Module):
 
 class TaskBlock(nn.Module):
     """One affordance from the features. A conditional block has a group of nodes for each command; a sample passes the
-    group of its command only, and so only that one receives its gradient."""
+    group of its command only, and so only that one receives its gradient. `BlockConfig.conditioning` has the other
+    ways to tell it the command: as an input, or by choosing among the values of all commands, where only the one that
+    is chosen receives a gradient."""
 
     def __init__(self, config: BlockConfig, spec: AffordanceSpec, n_features: int) -> None:
         super().__init__()
         self.config = config
         self.n_outputs = spec.outputs
-        n_groups = len(COMMANDS) if spec.conditional else 1
-        self.groups = nn.ModuleList(NodeGroup(config, n_features, spec.outputs) for _ in range(n_groups))
+        self.conditioning = config.conditioning if spec.conditional else None
+        n_groups = len(COMMANDS) if self.conditioning == "groups" else 1
+        n_inputs = n_features + (len(COMMANDS) if self.conditioning == "input" else 0)
+        n_outputs = spec.outputs * (len(COMMANDS) if self.conditioning == "all" else 1)
+        self.groups = nn.ModuleList(NodeGroup(config, n_inputs, n_outputs) for _ in range(n_groups))
 
     def group(self, command: int) -> NodeGroup:
         """The nodes that a command, by its number, activates."""
@@ -89,10 +94,25 @@ class TaskBlock(nn.Module):
 
     def forward(self, features: Tensor, command: Tensor) -> Tensor:
         """Features (B, T, F) and the commands (B, S) of the last S frames to outputs (B * S, outputs)."""
-        sequence, command = self._sequences(features, command.shape[1]), command.flatten()
+        return self.decide(self._sequences(features, command.shape[1]), command.flatten())
+
+    def decide(self, sequence: Tensor, command: Tensor) -> Tensor:
+        """The frames that the block sees (N, length, F) and their commands (N,) to outputs (N, outputs)."""
+        if self.conditioning == "input":
+            one_hot = nn.functional.one_hot(command, len(COMMANDS)).to(sequence.dtype)
+            sequence = torch.cat((sequence, one_hot[:, None].expand(-1, sequence.shape[1], -1)), dim=2)
         if len(self.groups) == 1 or len(command) == 1:  # when driving there is one frame and one command
             result: Tensor = self.group(int(command[0]))(sequence)
-            return result
+            return self._of_command(result, command) if self.conditioning == "all" else result
+        return self._by_group(sequence, command)
+
+    def _of_command(self, outputs: Tensor, command: Tensor) -> Tensor:
+        """Of the outputs for all commands (N, commands * outputs) those of each sample's own (N, outputs)."""
+        samples = torch.arange(len(outputs), device=outputs.device)
+        return outputs.view(len(outputs), len(COMMANDS), -1)[samples, command]
+
+    def _by_group(self, sequence: Tensor, command: Tensor) -> Tensor:
+        """Each sample through the group of its command."""
         outputs = sequence.new_zeros(len(sequence), self.n_outputs)
         for number, group in enumerate(self.groups):
             active = (command == number).nonzero()[:, 0]
