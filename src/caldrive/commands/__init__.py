@@ -18,6 +18,7 @@ from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
 from caldrive.commands.explain import Blame
+from caldrive.commands.search import Search
 from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
@@ -45,6 +46,7 @@ VERBS: Mapping[str, Verb] = {
     "convert": Verb(Convert, "Write a recording in a format that others' code reads."),
     "train": Verb(Train, "Train an agent's network on a recording."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
+    "search": Verb(Search, "Search for better task blocks of the network."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
     "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.explain.blame import Blame
     from caldrive.perception.evaluation.report import Report
     from caldrive.recordings.check import RecordingSummary
+    from caldrive.search.run import Findings
 
 
 def _row(k: int, result: EpisodeResult) -> list[str | Text]:
@@ -195,3 +196,22 @@ def blame_table(blame: Blame, name: str, episodes: int) -> Group:
     table.add_row("all of them", str(len(blame.rescued["all"])), "")
     table.add_row("controller and world", "", str(len(blame.rest)))
     return Group(Text(f"{name}: {failures} of {episodes} episodes went wrong"), table)
+
+
+def search_table(findings: Findings, page: Path) -> Group:
+    """The best block of each task with its score, and where everything is."""
+    from caldrive.search.report import change, printed
+
+    columns = ("task", "type", "nodes", "dropout", "frames", "apart", "score", "without history", "trials", "pruned")
+    table = Table(*columns, box=SIMPLE_HEAD)
+    for task in findings.tasks:
+        best, single = task.best, task.best_of_kind(temporal=False)
+        block = best.block
+        gain = "-" if single is None else f"{printed(task.task, single.mean)} ({change(single.mean, best.mean)})"
+        table.add_row(
+            BY_NAME[task.task].title, block.layer, str(block.nodes), f"{block.dropout:.2f}", str(block.length),
+            str(block.dilation), f"{printed(task.task, best.mean)} ± {printed(task.task, best.spread)}", gain,
+            str(len(task.trials)), str(sum(trial.pruned for trial in task.trials)),
+        )  # fmt: skip
+    drive = Text(f"drive: caldrive drive --model {findings.networks['groups'].path}")
+    return Group(table, Text(f"report: {page}"), drive)

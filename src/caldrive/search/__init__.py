@@ -1,0 +1,1 @@
+"""A search for the task blocks' hyperparameters, as in the paper's supplement."""

@@ -1,0 +1,197 @@
+"""A search from a recording and a network to a better one and a report; killed anywhere, the same call goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
+from typing import Any, TypeVar
+
+from caldrive.affordances import BY_NAME, CONDITIONAL
+from caldrive.checks import MOST_WORKERS, require_within, require_writable_folder
+from caldrive.files import locked_folder, read_json, write_whole
+from caldrive.parallel.processes import parallel_map
+from caldrive.parallel.ray_cluster import cluster_map, require_ray
+from caldrive.perception.network.checkpoint import load_network
+from caldrive.perception.network.config import BlockConfig, Conditioning
+from caldrive.progress import Progress, silent
+from caldrive.search.best import (
+    CONDITIONINGS,
+    Retrained,
+    RetrainingJob,
+    best_of,
+    conditioning_jobs,
+    retrain,
+    retrained,
+    retraining_jobs,
+    value_of,
+)
+from caldrive.search.config import SearchConfig
+from caldrive.search.examples import Source, features_digest, make_features
+from caldrive.search.joint import JointNetwork, network_scores, train_joint
+from caldrive.search.studies import (
+    FinishedTrial,
+    finished_trials,
+    mend_journal,
+    missing_jobs,
+    require_optuna,
+    run_trial,
+    worker_examples,
+)
+
+SETTINGS, MODEL = "search.json", "model.safetensors"
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who works: so many processes here, or Ray at an address."""
+
+    processes: int = 1
+    ray: str | None = None
+
+    def map(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[Item, Result]]:
+        """The items with their results as they are done."""
+        if self.ray is None:
+            return parallel_map(work, items, self.processes)
+        return cluster_map(work, items, self.processes, self.ray)
+
+
+@dataclass(frozen=True)
+class TaskFindings:
+    """What a search found for a task."""
+
+    task: str
+    trials: tuple[FinishedTrial, ...]
+    """By their numbers."""
+    retrained: tuple[Retrained, ...]
+    """The best, with several seeds, in the order of their trials' values."""
+    conditioned: tuple[Retrained, ...]
+    """The best with each way to tell it the command, where that was asked for."""
+
+    @property
+    def best(self) -> Retrained:
+        """Of those that were trained again."""
+        return best_of(self.task, self.retrained)
+
+    def best_of_kind(self, *, temporal: bool) -> Retrained | None:
+        """The best with history, or without; None where no trial was of that kind."""
+        blocks = [block for block in self.retrained if block.block.temporal == temporal]
+        return best_of(self.task, blocks) if blocks else None
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a search found."""
+
+    tasks: tuple[TaskFindings, ...]
+    before: Mapping[str, float]
+    """The scores by task of the network that the backbone comes from."""
+    networks: Mapping[Conditioning, JointNetwork]
+    """That of the best blocks (groups), and the same with other ways to tell the command, where that was asked for."""
+    frames: tuple[int, int]
+    """That blocks learn from and are compared on."""
+    episodes: tuple[int, int]
+    """That train and that are held out."""
+
+
+def search(config: SearchConfig, source: Source, workers: Workers, progress: Progress = silent) -> Findings:
+    """Does what a search's folder lacks: trials, the best of each task again, and the network of the best.
+
+    In the folder lie journal.log (Optuna's), features, retrained, and model.safetensors. Raises ValueError where the
+    data, the network or what lies in the folder does not go together, RuntimeError without Optuna.
+    """
+    require_optuna()
+    if workers.ray is not None:
+        require_ray()
+    require_within("--workers", workers.processes, 1, MOST_WORKERS, 2)
+    require_writable_folder(source.out)
+    with locked_folder(source.out):
+        try:
+            make_features(source, config, progress)
+            _claim(source, config)
+            mend_journal(source.out)
+            _run_trials(config, source, workers, progress)
+            return _findings(config, source, workers, progress)
+        finally:
+            worker_examples.cache_clear()
+
+
+def _claim(source: Source, config: SearchConfig) -> None:
+    """Writes what the trials depend on. Raises ValueError where the folder's trials depend on something else."""
+    path = source.out / SETTINGS
+    wanted = config.decisive() | {"features": features_digest(source)}
+    if not path.is_file():
+        write_whole(path, json.dumps(wanted, indent=1).encode())
+        return
+    try:
+        found = read_json(path.read_bytes(), dict[str, Any])
+    except ValueError as error:
+        raise ValueError(f"found that {path} is damaged ({error}), wanted a search's: give another --out") from error
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise ValueError(
+                f"found in {source.out} a search with {name} {found.get(name)}, wanted {value}: type the same "
+                "settings, --data and --model, or another --out"
+            )
+
+
+def _run_trials(config: SearchConfig, source: Source, workers: Workers, progress: Progress) -> None:
+    """The trials that are missing."""
+    jobs, total = missing_jobs(source, config), config.trials * len(config.tasks)
+    for done, (job, _) in enumerate(workers.map(partial(run_trial, source, config), jobs), total - len(jobs) + 1):
+        progress(f"trial {done} of {total}, {BY_NAME[job.task].title}", done / total)
+
+
+def _findings(config: SearchConfig, source: Source, workers: Workers, progress: Progress) -> Findings:
+    """Trains the best again, then their network."""
+    trials = {task: finished_trials(source, config, task) for task in config.tasks}
+    jobs = {task: retraining_jobs(task, trials[task], config) for task in config.tasks}
+    _retrain(list(chain(*jobs.values())), config, source, workers, progress)
+    again = {task: retrained(source, jobs[task]) for task in config.tasks}
+    best = {task: best_of(task, blocks) for task, blocks in again.items()}
+    conditional = [spec.name for spec in CONDITIONAL if spec.name in best] if config.conditioning else []
+    told = {task: conditioning_jobs(task, best[task], config) for task in conditional}
+    _retrain(list(chain(*told.values())), config, source, workers, progress)
+    networks = {
+        kind: train_joint(source, config, blocks, source.out / _file(kind), progress)
+        for kind, blocks in _networks(best, conditional)
+    }
+    training, validation = worker_examples(source)
+    return Findings(
+        tasks=tuple(
+            TaskFindings(task, tuple(trials[task]), tuple(again[task]), tuple(retrained(source, told.get(task, []))))
+            for task in config.tasks
+        ),
+        before=network_scores(load_network(source.model)[0], validation),
+        networks=networks,
+        frames=(len(training.targets), len(validation.targets)),
+        episodes=(len(training.frames.episodes), len(validation.frames.episodes)),
+    )
+
+
+def _retrain(
+    jobs: Sequence[RetrainingJob], config: SearchConfig, source: Source, workers: Workers, progress: Progress
+) -> None:
+    """The trainings of the best blocks that are missing."""
+    missing = [job for job in jobs if value_of(source, job) is None]
+    work = partial(retrain, source, config)
+    for done, (job, _) in enumerate(workers.map(work, missing), len(jobs) - len(missing) + 1):
+        progress(f"the best again, {done} of {len(jobs)}, {BY_NAME[job.task].title}", done / len(jobs))
+
+
+def _file(kind: Conditioning) -> str:
+    """The name of a network's file."""
+    return MODEL if kind == CONDITIONINGS[0] else f"conditioning-{kind}.safetensors"
+
+
+def _networks(
+    best: Mapping[str, Retrained], conditional: Sequence[str]
+) -> Iterator[tuple[Conditioning, dict[str, BlockConfig]]]:
+    """The blocks of the best network, by its way to tell them the command."""
+    blocks = {task: found.block for task, found in best.items()}
+    for kind in CONDITIONINGS if conditional else CONDITIONINGS[:1]:
+        yield kind, blocks | {task: replace(blocks[task], conditioning=kind) for task in conditional}
