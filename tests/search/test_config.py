@@ -1,0 +1,31 @@
+"""The settings of a search and their limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from caldrive.search.config import SearchConfig
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"trials": 0}, "found --trials 0, wanted 1 to 100000: type --trials 40"),
+        ({"evaluations": 0}, "found --evaluations 0"),
+        ({"validation_share": 1.0}, "found --validation-share 1.0, wanted 0.0 to 0.9"),
+        ({"learning_rate": float("nan")}, "found --learning-rate nan"),
+        ({"tasks": ("speed",)}, "found --tasks speed, wanted some of hazard_stop, red_light"),
+        ({"tasks": ()}, "found --tasks none, wanted some of"),
+        ({"tasks": ("red_light", "red_light")}, "found --tasks red_light red_light, wanted some of"),
+    ],
+)
+def test_settings_that_cannot_be_are_named(settings: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        SearchConfig(**settings)
+
+
+def test_more_trials_or_tasks_go_on_with_the_same_search() -> None:
+    assert SearchConfig(trials=7, tasks=("red_light",)).decisive() == SearchConfig().decisive()
+    assert SearchConfig(steps=7).decisive() != SearchConfig().decisive()
