@@ -28,6 +28,8 @@ COMMANDS = {
     "convert": "recording --validation-share 0.5 --out corl2017",
     "train": "--data recording --steps 2 --batch 2 --history-steps 1 --history-batch 2 --camera-check-steps 1 "
     "--out training",
+    "search": "--data recording --model training/model.safetensors --tasks relative_angle --trials 1 --steps 2 "
+    "--batch 2 --seeds 1 --joint-steps 1 --workers 1 --out search",
     "evaluate": "--data recording --model training/model.safetensors --worst worst.png",
     "see": "labels.png --out see.mp4",
     "town": "--town town02 --plan plan.png",

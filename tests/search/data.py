@@ -12,7 +12,7 @@ from caldrive.search.studies import TrialJob, run_trial
 from tests.perception.data import SHORT, TINY, record
 
 TINY_SEARCH = SearchConfig(
-    trials=4, tasks=("hazard_stop", "relative_angle"), steps=10, batch=8, validation_frames=40, best=1, seeds=2,
+    trials=4, tasks=("hazard_stop", "relative_angle"), steps=5, batch=8, validation_frames=40, best=1, seeds=2,
     joint_steps=4,
 )  # fmt: skip
 
