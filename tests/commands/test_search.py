@@ -38,7 +38,7 @@ def test_every_setting_is_an_option_and_may_come_from_a_file(tmp_path: Path) -> 
     ("options", "sentence"),
     [
         (("--trials", "0"), "found --trials 0, wanted 1 to 100000"),
-        (("--tasks", "wings"), "found --tasks wings, wanted some of hazard_stop"),
+        (("--tasks", "wings"), "found --tasks wings, wanted one of hazard_stop"),
         (("--sampler", "grid"), "found --sampler grid, wanted one of random, tpe"),
         (("--data", "gone"), "there is no episode"),
         (("--model", "gone.safetensors"), "found no file"),

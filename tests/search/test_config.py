@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from caldrive.search.config import SearchConfig
+from caldrive.affordances import SPECS
+from caldrive.search.config import TASKS, SearchConfig
 
 
 @pytest.mark.parametrize(
@@ -24,6 +25,10 @@ from caldrive.search.config import SearchConfig
 def test_settings_that_cannot_be_are_named(settings: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         SearchConfig(**settings)
+
+
+def test_a_task_is_an_affordance() -> None:
+    assert list(TASKS) == [spec.name for spec in SPECS]
 
 
 def test_more_trials_or_tasks_go_on_with_the_same_search() -> None:

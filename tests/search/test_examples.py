@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Pose
 from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_tensors, write_tensors
 from caldrive.perception.network.config import BlockConfig
@@ -48,7 +49,7 @@ def test_a_block_sees_in_a_search_what_it_sees_when_it_drives(parts: tuple[Examp
     torch.manual_seed(0)
     config = BlockConfig(layer, 6, 0.0, length=5, dilation=3)  # type: ignore[arg-type]
     examples, ids = parts[0], np.array([2, 70, 91, 170])  # two of them before the history is whole
-    block = TaskBlock(config, examples_module.BY_NAME["hazard_stop"], examples.features.shape[1])
+    block = TaskBlock(config, BY_NAME["hazard_stop"], examples.features.shape[1])
     found = outputs_of(block, examples, ids)
     for row, i in enumerate(ids):
         history = examples.features[examples.frames.stream_start[i] : i + 1].float()[None]

@@ -14,6 +14,8 @@ from caldrive.parallel.processes import parallel_map
 from caldrive.search import studies
 from caldrive.search.config import SearchConfig
 from caldrive.search.examples import Source, load_examples
+from caldrive.search.learning import evaluation_step
+from caldrive.search.space import suggest_block
 from caldrive.search.studies import (
     JOURNAL,
     FinishedTrial,
@@ -105,7 +107,7 @@ def test_more_trials_go_on_with_those_that_are_done(own: Source) -> None:
 
 
 def test_a_trial_that_is_worse_than_the_median_is_pruned(own: Source, monkeypatch: pytest.MonkeyPatch) -> None:
-    steps = [studies.evaluation_step(ANGLE, k) for k in range(1, ANGLE.evaluations + 1)]
+    steps = [evaluation_step(ANGLE, k) for k in range(1, ANGLE.evaluations + 1)]
     errors = iter([0.1, 0.2, 0.3, 0.4, 0.5, 9.0, 0.25, 9.0])  # a trial each; five of them are never pruned
     monkeypatch.setattr(
         studies,
@@ -131,7 +133,7 @@ def test_another_sampler_learns_from_earlier_trials(own: Source, monkeypatch: py
     for draw in range(config.trials):
         study = open_study(own.out, config, "relative_angle", draw)
         trial = study.ask()
-        block = studies.suggest_block(trial, studies.own_block(own, "relative_angle"))
+        block = suggest_block(trial, studies.own_block(own, "relative_angle"))
         study.tell(trial, float(block.nodes))  # the fewer, the better
     nodes = [trial.params["nodes"] for trial in study.trials]
     assert sum(nodes[20:]) < 0.7 * sum(nodes[:10])
@@ -167,7 +169,7 @@ def test_what_matters_is_said_once_there_are_enough_trials(own: Source, monkeypa
     for draw in range(30):
         study = open_study(own.out, ANGLE, "relative_angle", draw)
         trial = study.ask()
-        block = studies.suggest_block(trial, studies.own_block(own, "relative_angle"))
+        block = suggest_block(trial, studies.own_block(own, "relative_angle"))
         study.tell(trial, float(block.nodes))
     shares = importances(own, ANGLE, "relative_angle")
     assert max(shares, key=lambda name: shares[name]) == "nodes"

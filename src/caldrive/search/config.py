@@ -1,12 +1,14 @@
-"""Settings of a search for task blocks, with their limits. No import here waits for torch or Optuna."""
+"""Settings of a search for task blocks, with their limits. No import here waits for torch, Optuna or numpy."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
-from caldrive.affordances import BY_NAME
 from caldrive.checks import MOST_SEED, Limits, require_limits
+
+Task = Literal["hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance"]
+TASKS: tuple[Task, ...] = get_args(Task)
 
 LIMITS: Limits = {
     "trials": (1, 100_000),
@@ -31,7 +33,7 @@ class SearchConfig:
 
     trials: int = 40
     """Trials of each task. More of them go on with a search that is finished."""
-    tasks: tuple[str, ...] = tuple(BY_NAME)
+    tasks: tuple[Task, ...] = TASKS
     """The affordances whose blocks are sought; the others keep the network's."""
     sampler: Literal["random", "tpe"] = "random"
     """random: as in the paper, the same draw for all tasks; tpe: a tree-structured Parzen estimator, which learns from
@@ -65,10 +67,10 @@ class SearchConfig:
     def __post_init__(self) -> None:
         usual = {field.name: field.default for field in fields(self)}
         require_limits(vars(self), LIMITS, usual)
-        unknown = [task for task in self.tasks if task not in BY_NAME]
+        unknown = [task for task in self.tasks if task not in TASKS]
         if unknown or not self.tasks or len(set(self.tasks)) < len(self.tasks):
             found = unknown[0] if unknown else " ".join(self.tasks) or "none"
-            raise ValueError(f"found --tasks {found}, wanted some of {', '.join(BY_NAME)}: type --tasks hazard_stop")
+            raise ValueError(f"found --tasks {found}, wanted some of {', '.join(TASKS)}: type --tasks hazard_stop")
 
     def decisive(self) -> dict[str, Any]:
         """The settings on which a trial depends."""

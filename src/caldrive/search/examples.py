@@ -136,7 +136,7 @@ def _require_targets(frames: Frames, n: int, tasks: Sequence[str], place: str) -
             f"found no frame of {place} behind the first {HISTORY} of its episode, wanted some: record longer episodes"
         )
     for spec in map(BY_NAME.__getitem__, tasks):
-        if spec.discrete and len(frames.targets[spec.name][targets].unique()) < 2:
+        if spec.discrete and len(np.unique(frames.targets[spec.name].numpy()[targets])) < 2:
             raise EpisodeError(
                 f"found one value only of the {spec.title} among {len(targets)} frames of {place}, wanted several: "
                 "record more episodes, or leave it out of --tasks"

@@ -13,6 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from caldrive.affordances import BY_NAME
 from caldrive.perception.network.checkpoint import read_info
 from caldrive.perception.network.config import BlockConfig
@@ -93,7 +95,7 @@ def open_study(out: Path, config: SearchConfig, task: str, draw: int = 0) -> Any
             storage=optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(out / JOURNAL))),
             study_name=task,
             direction="maximize" if spec.discrete else "minimize",
-            sampler=samplers[config.sampler](seed=training_seed(config.seed, draw)),
+            sampler=samplers[config.sampler](seed=_draw_seed(config, draw)),
             pruner=optuna.pruners.MedianPruner(STARTUP_TRIALS, n_warmup_steps=evaluation_step(config, 2)),
             load_if_exists=True,
         )
@@ -101,6 +103,11 @@ def open_study(out: Path, config: SearchConfig, task: str, draw: int = 0) -> Any
         raise ValueError(
             f"found that {out / JOURNAL} is damaged ({error}), wanted a search's journal: give another --out"
         ) from error
+
+
+def _draw_seed(config: SearchConfig, draw: int) -> int:
+    """Of what a trial draws. The first numbers from seeds that lie side by side would not be independent."""
+    return int(np.random.SeedSequence((config.seed, draw)).generate_state(1)[0])
 
 
 def abandon(study: Any) -> None:
