@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from caldrive.search.examples import Source, make_features
+from caldrive.progress import silent
+from caldrive.search.examples import Source, checked_parts, make_features
 from caldrive.search.run import Findings, Workers, search
 from tests.search.data import TINY_SEARCH, make_source
 
@@ -15,7 +16,7 @@ from tests.search.data import TINY_SEARCH, make_source
 def source(tmp_path_factory: pytest.TempPathFactory) -> Source:
     """With its features."""
     source = make_source(tmp_path_factory.mktemp("search"))
-    make_features(source, TINY_SEARCH, lambda label, share: None)
+    make_features(source, checked_parts(source, TINY_SEARCH), silent)
     return source
 
 

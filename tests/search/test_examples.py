@@ -19,7 +19,16 @@ from caldrive.recordings.writer import EpisodeError
 from caldrive.scenarios import Scenario
 from caldrive.search import examples as examples_module
 from caldrive.search.config import SearchConfig
-from caldrive.search.examples import HISTORY, Examples, Source, evenly, load_examples, make_features, split_episodes
+from caldrive.search.examples import (
+    HISTORY,
+    Examples,
+    Source,
+    checked_parts,
+    evenly,
+    load_examples,
+    make_features,
+    split_episodes,
+)
 from caldrive.search.learning import outputs_of
 from tests.perception.data import record
 from tests.search.data import TINY_SEARCH
@@ -65,7 +74,7 @@ def test_frames_are_taken_as_far_apart_as_can_be() -> None:
 
 def test_features_are_made_once(source: Source, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(examples_module, "feature_table", None)
-    make_features(source, TINY_SEARCH, silent)
+    make_features(source, checked_parts(source, TINY_SEARCH), silent)
 
 
 def test_features_of_another_network_are_not_taken(source: Source, tmp_path: Path) -> None:
@@ -73,7 +82,7 @@ def test_features_of_another_network_are_not_taken(source: Source, tmp_path: Pat
     for part in ("training", "validation"):
         stale = {"features": torch.zeros(1, 1)}
         write_tensors(tmp_path / "features" / f"{part}.safetensors", stale, {"kind": "features", "digest": "another"})
-    make_features(other, TINY_SEARCH, silent)
+    make_features(other, checked_parts(other, TINY_SEARCH), silent)
     assert torch.equal(load_examples(other)[1].features, load_examples(source)[1].features)
 
 
@@ -81,7 +90,7 @@ def test_a_network_of_other_affordances_is_refused(source: Source, tmp_path: Pat
     tensors, header = read_tensors(source.model)
     write_tensors(tmp_path / "model.safetensors", tensors, header | {"specs": []})
     with pytest.raises(CheckpointError, match="a network for other affordances"):
-        make_features(replace(source, model=tmp_path / "model.safetensors", out=tmp_path), TINY_SEARCH, silent)
+        checked_parts(replace(source, model=tmp_path / "model.safetensors"), TINY_SEARCH)
 
 
 def test_a_recording_without_the_held_out_episodes_is_refused(source: Source, tmp_path: Path) -> None:
@@ -104,9 +113,9 @@ def test_towns_that_judge_are_refused(town: str, source: Source, tmp_path: Path)
 def test_episodes_that_are_too_short_are_refused(source: Source, tmp_path: Path) -> None:
     other = replace(source, data=record(tmp_path, n_frames=60, n_cameras=1), validation_share=0.3)
     with pytest.raises(EpisodeError, match=r"found no frame of training in .* behind the first 60 of its episode"):
-        make_features(other, TINY_SEARCH, silent)
+        checked_parts(other, TINY_SEARCH)
 
 
 def test_an_affordance_that_never_changes_is_refused(source: Source) -> None:
     with pytest.raises(EpisodeError, match=r"found one value only of the red light .* or leave it out of --tasks"):
-        make_features(source, SearchConfig(tasks=("red_light",)), silent)
+        checked_parts(source, SearchConfig(tasks=("red_light",)))

@@ -107,24 +107,38 @@ def _held_out(episodes: Sequence[Episode], keys: Sequence[str], source: Source) 
     return validation
 
 
-def make_features(source: Source, config: SearchConfig, progress: Progress) -> None:
-    """Writes the features of both parts of the episodes, unless they are there; goes on after a kill.
+@dataclass(frozen=True)
+class Part:
+    """The frames that train, or those that validate, before there are features of them. digest: tells these from
+    others."""
 
-    Raises EpisodeError where an episode does not fit the network, or an affordance that is sought never changes.
-    """
-    network, info = load_network(source.model)
-    size = network.config.image_size
-    parts = {part: Frames(rows, size) for part, rows in zip(PARTS, split_episodes(source, images=False), strict=True)}
-    for part, frames in parts.items():
+    path: Path
+    frames: Frames
+    digest: str
+
+
+def checked_parts(source: Source, config: SearchConfig) -> list[Part]:
+    """Frames that train and frames that validate. Raises EpisodeError where an affordance that is sought never changes,
+    CheckpointError where the network does not fit this code."""
+    size, parts = read_info(source.model).config.image_size, []
+    for part, episodes in zip(PARTS, split_episodes(source, images=False), strict=True):
+        frames = Frames(episodes, size)
         n = config.validation_frames if part == PARTS[1] else len(frames)
         _require_targets(frames, n, config.tasks, f"{part} in {source.data}")
-    for part, frames in parts.items():
-        path, digest = _path(source, part), _digest(source, frames)
-        if not _is_there(path, digest):
-            seen = Frames([read_episode(episode.path) for episode in frames.episodes], size)
-            chunks = path.with_suffix("")
+        parts.append(Part(_path(source, part), frames, _digest(source, frames)))
+    return parts
+
+
+def make_features(source: Source, parts: Sequence[Part], progress: Progress) -> None:
+    """Writes the features of all frames, unless they are there; goes on after a kill. Raises EpisodeError where images
+    do not fit the network."""
+    network, info = load_network(source.model)
+    for part in parts:
+        if not _is_there(part.path, part.digest):
+            seen = Frames([read_episode(episode.path) for episode in part.frames.episodes], network.config.image_size)
+            chunks = part.path.with_suffix("")
             table = feature_table(network, seen, info.ranges, chunks, progress)
-            write_tensors(path, {"features": table}, {"kind": "features", "digest": digest})
+            write_tensors(part.path, {"features": table}, {"kind": "features", "digest": part.digest})
             shutil.rmtree(chunks)
 
 
@@ -144,7 +158,7 @@ def _require_targets(frames: Frames, n: int, tasks: Sequence[str], place: str) -
 
 
 def load_examples(source: Source) -> tuple[Examples, Examples]:
-    """Those that train and those that validate, once `make_features` has been there. The features are mapped into
+    """Those that train and those that validate, once `make_features` was there. The features are mapped into
     memory, so that processes share them."""
     size = read_info(source.model).config.image_size
     examples = []

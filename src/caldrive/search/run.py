@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
+from pathlib import Path
 from typing import Any, TypeVar
 
 from caldrive.affordances import BY_NAME, CONDITIONAL
@@ -29,7 +30,7 @@ from caldrive.search.best import (
     value_of,
 )
 from caldrive.search.config import SearchConfig
-from caldrive.search.examples import Source, features_digest, make_features
+from caldrive.search.examples import Source, checked_parts, make_features
 from caldrive.search.joint import JointNetwork, network_scores, train_joint
 from caldrive.search.studies import (
     FinishedTrial,
@@ -111,8 +112,9 @@ def search(config: SearchConfig, source: Source, workers: Workers, progress: Pro
     require_writable_folder(source.out)
     with locked_folder(source.out):
         try:
-            make_features(source, config, progress)
-            _claim(source, config)
+            parts = checked_parts(source, config)
+            _claim(source.out, config, [part.digest for part in parts])
+            make_features(source, parts, progress)
             mend_journal(source.out)
             _run_trials(config, source, workers, progress)
             return _findings(config, source, workers, progress)
@@ -120,10 +122,9 @@ def search(config: SearchConfig, source: Source, workers: Workers, progress: Pro
             worker_examples.cache_clear()
 
 
-def _claim(source: Source, config: SearchConfig) -> None:
+def _claim(out: Path, config: SearchConfig, digests: list[str]) -> None:
     """Writes what the trials depend on. Raises ValueError where the folder's trials depend on something else."""
-    path = source.out / SETTINGS
-    wanted = config.decisive() | {"features": features_digest(source)}
+    path, wanted = out / SETTINGS, config.decisive() | {"features": digests}
     if not path.is_file():
         write_whole(path, json.dumps(wanted, indent=1).encode())
         return
@@ -134,7 +135,7 @@ def _claim(source: Source, config: SearchConfig) -> None:
     for name, value in wanted.items():
         if found.get(name) != value:
             raise ValueError(
-                f"found in {source.out} a search with {name} {found.get(name)}, wanted {value}: type the same "
+                f"found in {out} a search with {name} {found.get(name)}, wanted {value}: type the same "
                 "settings, --data and --model, or another --out"
             )
 
@@ -148,14 +149,14 @@ def _run_trials(config: SearchConfig, source: Source, workers: Workers, progress
 
 def _findings(config: SearchConfig, source: Source, workers: Workers, progress: Progress) -> Findings:
     """Trains the best again, then their network."""
-    trials = {task: finished_trials(source, config, task) for task in config.tasks}
-    jobs = {task: retraining_jobs(task, trials[task], config) for task in config.tasks}
-    _retrain(list(chain(*jobs.values())), config, source, workers, progress)
-    again = {task: retrained(source, jobs[task]) for task in config.tasks}
+    tasks: tuple[str, ...] = config.tasks
+    trials = {task: finished_trials(source, config, task) for task in tasks}
+    jobs = {task: retraining_jobs(task, trials[task], config) for task in tasks}
+    again = _retrain(jobs, config, source, workers, progress)
     best = {task: best_of(task, blocks) for task, blocks in again.items()}
     conditional = [spec.name for spec in CONDITIONAL if spec.name in best] if config.conditioning else []
-    told = {task: conditioning_jobs(task, best[task], config) for task in conditional}
-    _retrain(list(chain(*told.values())), config, source, workers, progress)
+    jobs = {task: conditioning_jobs(task, best[task], config) for task in conditional}
+    conditioned = _retrain(jobs, config, source, workers, progress)
     networks = {
         kind: train_joint(source, config, blocks, source.out / _file(kind), progress)
         for kind, blocks in _networks(best, conditional)
@@ -163,8 +164,8 @@ def _findings(config: SearchConfig, source: Source, workers: Workers, progress: 
     training, validation = worker_examples(source)
     return Findings(
         tasks=tuple(
-            TaskFindings(task, tuple(trials[task]), tuple(again[task]), tuple(retrained(source, told.get(task, []))))
-            for task in config.tasks
+            TaskFindings(task, tuple(trials[task]), tuple(again[task]), tuple(conditioned.get(task, ())))
+            for task in tasks
         ),
         before=network_scores(load_network(source.model)[0], validation),
         networks=networks,
@@ -174,13 +175,15 @@ def _findings(config: SearchConfig, source: Source, workers: Workers, progress: 
 
 
 def _retrain(
-    jobs: Sequence[RetrainingJob], config: SearchConfig, source: Source, workers: Workers, progress: Progress
-) -> None:
-    """The trainings of the best blocks that are missing."""
-    missing = [job for job in jobs if value_of(source, job) is None]
-    work = partial(retrain, source, config)
-    for done, (job, _) in enumerate(workers.map(work, missing), len(jobs) - len(missing) + 1):
-        progress(f"the best again, {done} of {len(jobs)}, {BY_NAME[job.task].title}", done / len(jobs))
+    jobs: Mapping[str, list[RetrainingJob]], config: SearchConfig, source: Source, workers: Workers, progress: Progress
+) -> dict[str, list[Retrained]]:
+    """Does the trainings of the best blocks that are missing; returns all of them by task."""
+    everything = list(chain(*jobs.values()))
+    missing = [job for job in everything if value_of(source, job) is None]
+    work, total = partial(retrain, source, config), len(everything)
+    for done, (job, _) in enumerate(workers.map(work, missing), total - len(missing) + 1):
+        progress(f"the best again, {done} of {total}, {BY_NAME[job.task].title}", done / total)
+    return {task: retrained(source, of_task) for task, of_task in jobs.items()}
 
 
 def _file(kind: Conditioning) -> str:
