@@ -17,7 +17,7 @@ from caldrive.commands.answer import Answer
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
-from caldrive.commands.explain import Blame
+from caldrive.commands.explain import Blame, ExplainDrive, ExplainPictures, ExplainRecording
 from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
@@ -40,6 +40,9 @@ VERBS: Mapping[str, Verb] = {
     "replay": Verb(Replay, "Drive a benchmark's episode again, and film it."),
     "report": Verb(Report, "Tables and a page on one or more benchmarks."),
     "blame": Verb(Blame, "Say which affordance is to blame for a benchmark's failures."),
+    "explain drive": Verb(ExplainDrive, "Film where the network looks in a drive."),
+    "explain pictures": Verb(ExplainPictures, "Film where it looks in your own video or pictures."),
+    "explain recording": Verb(ExplainRecording, "Draw where it looks in recorded frames, and measure it."),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
     "convert": Verb(Convert, "Write a recording in a format that others' code reads."),
@@ -51,7 +54,10 @@ VERBS: Mapping[str, Verb] = {
     "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),
     "determinism": Verb(Determinism, "Drive the same episode twice and compare all bytes."),
 }
-GROUPS = {"speed": "Measure how fast the world or the agent is."}  # first words of verbs of two words
+GROUPS = {
+    "explain": "Show where the network looks.",
+    "speed": "Measure how fast the world or the agent is.",
+}  # first words of verbs of two words
 
 
 def verb_words(arguments: Sequence[str]) -> str:
