@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # the command line's help waits for neither torch nor SUMO
 
 MODELS = Path(__file__).parents[1] / "models"
 SHIPPED_MODEL = MODELS / "cal.safetensors"
+AUXILIARY = "auxiliary-camera"  # a variant of mp
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class AgentEntry:
     """Whether it knows the truth, and so is no agent under test."""
     variants: Mapping[str, str] = field(default_factory=dict)
     """Other ways in which it can drive, with a word on each."""
+    auxiliary: Callable[[AgentSettings], CameraConfig | None] = lambda _: None
+    """The second camera that it wants, None for most."""
 
 
 def model_path(model: Path | None, agent: str = "cal") -> Path:
@@ -137,6 +140,40 @@ def _cil_provenance(settings: AgentSettings) -> dict[str, Any]:
     return {"model": file_digest(path), "precision": driving_precision("auto", read_imitation_info(path).ranges)}
 
 
+def _make_mp(settings: AgentSettings, dt: float, truth: TruthSource | None) -> Agent:
+    from caldrive.agents.modular_pipeline.agent import ModularPipelineAgent
+    from caldrive.agents.modular_pipeline.segmenter import NetworkSegmenter
+
+    segmenter = NetworkSegmenter(model_path(settings.model, "mp"))
+    return ModularPipelineAgent(
+        segmenter, _mp_camera(settings), segmenter.network.config.class_size, dt, settings.cap,
+        auxiliary=settings.variant == AUXILIARY,
+    )  # fmt: skip
+
+
+def _mp_camera(settings: AgentSettings) -> CameraConfig:
+    from caldrive.agents.modular_pipeline.checkpoint import read_segmentation_info
+
+    network = read_segmentation_info(model_path(settings.model, "mp")).config
+    return CameraConfig(width=network.image_width, height=network.image_height)
+
+
+def _mp_auxiliary(settings: AgentSettings) -> CameraConfig | None:
+    from caldrive.agents.modular_pipeline.agent import auxiliary_camera
+
+    return auxiliary_camera(_mp_camera(settings)) if settings.variant == AUXILIARY else None
+
+
+def _mp_provenance(settings: AgentSettings) -> dict[str, Any]:
+    from caldrive.agents.modular_pipeline.checkpoint import read_segmentation_info
+    from caldrive.perception.inference.precision import driving_precision
+
+    require_taken("the agent mp", ("model", "variant"), settings)
+    _require_variant("mp", settings)
+    path = model_path(settings.model, "mp")
+    return {"model": file_digest(path), "precision": driving_precision("auto", read_segmentation_info(path).ranges)}
+
+
 AGENTS: dict[str, AgentEntry] = {
     "cal": AgentEntry(
         make=lambda settings, dt, _: make_cal(settings, dt), camera=_cal_camera, provenance=_cal_provenance
@@ -147,5 +184,12 @@ AGENTS: dict[str, AgentEntry] = {
         camera=_cil_camera,
         provenance=_cil_provenance,
         variants={"avoid-stopping": "with the released agent's forced-stop fix"},
+    ),
+    "mp": AgentEntry(
+        make=_make_mp,
+        camera=_mp_camera,
+        provenance=_mp_provenance,
+        variants={AUXILIARY: "with the paper's second camera, which looks to the left in left turns"},
+        auxiliary=_mp_auxiliary,
     ),
 }
