@@ -17,15 +17,17 @@ from caldrive.agents.blind import require_affordances
 from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
 from caldrive.datatypes import CameraConfig
-from caldrive.interfaces import Agent, TruthSource
+from caldrive.interfaces import Agent, Perception, TruthSource
 from caldrive.plugins import Plugin, attribute, find_plugin
 from caldrive.provenance import file_digest
 
 if TYPE_CHECKING:  # the command line's help waits for neither torch nor SUMO
     from caldrive.agents.cal import CALAgent
+    from caldrive.agents.reinforcement.agent import ReinforcementAgent
 
 OFFERED = ("model", "controller")  # settings that an agent may take
-SHIPPED_MODEL = Path(__file__).parents[1] / "models" / "cal.safetensors"
+MODELS = Path(__file__).parents[1] / "models"
+SHIPPED_MODEL, SHIPPED_POLICY = MODELS / "cal.safetensors", MODELS / "rl.safetensors"
 
 
 @dataclass(frozen=True)
@@ -96,11 +98,73 @@ def _oracle_provenance(settings: AgentSettings) -> dict[str, Any]:
     return {}
 
 
+def policy_path(model: Path | None) -> Path:
+    """The policy asked for, or the package's. Raises FileNotFoundError where there is none."""
+    if model is None and not SHIPPED_POLICY.is_file():
+        raise FileNotFoundError(
+            "found no policy in this package, wanted one for the agent rl: "
+            "train one as docs/own/learner.md says, and give it with --model FILE"
+        )
+    return model or SHIPPED_POLICY
+
+
+def _make_rl(settings: AgentSettings, _: float, truth: TruthSource | None) -> ReinforcementAgent:
+    """The agent that drives by a policy; one that sees affordances has CAL's network for them, or the truth."""
+    from caldrive.agents.reinforcement.agent import load_agent
+
+    _require_taken("the agent rl", ("model",), settings)
+    return load_agent(policy_path(settings.model), lambda: _affordance_source(truth))
+
+
+def _affordance_source(truth: TruthSource | None) -> Perception:
+    from caldrive.agents.cal import OraclePerception
+    from caldrive.perception.inference.predictor import NetworkPerception
+
+    return NetworkPerception(model_path(None), threads=1) if truth is None else OraclePerception(truth)
+
+
+def _rl_camera(settings: AgentSettings) -> CameraConfig:
+    from caldrive.agents.reinforcement.agent import policy_camera
+    from caldrive.agents.reinforcement.checkpoint import read_policy_info
+
+    info = read_policy_info(policy_path(settings.model))
+    if info.policy.sees == "affordances":
+        return _cal_camera(AgentSettings())
+    return policy_camera(info.encoder.image_size if info.encoder else None)
+
+
+def _rl_provenance(settings: AgentSettings) -> dict[str, Any]:
+    """The policy's, and where it sees by CAL's network that one's, too."""
+    from caldrive.agents.reinforcement.checkpoint import read_policy_info
+    from caldrive.perception.inference.precision import driving_precision
+
+    _require_taken("the agent rl", ("model",), settings)
+    path = policy_path(settings.model)
+    info, model = read_policy_info(path), file_digest(path)
+    if info.policy.sees == "affordances":
+        network = _cal_provenance(AgentSettings())
+        return network | {"model": f"{model} {network['model']}"}
+    precision = driving_precision("auto", info.encoder.ranges) if info.encoder else None
+    return {"model": model, "precision": precision}
+
+
+def _rl_oracle_provenance(settings: AgentSettings) -> dict[str, Any]:
+    from caldrive.agents.reinforcement.checkpoint import read_policy_info
+
+    _require_taken("the agent rl-oracle", ("model",), settings)
+    path = policy_path(settings.model)
+    if (sees := read_policy_info(path).policy.sees) != "affordances":
+        raise ValueError(f"found in {path} a policy that sees {sees}, wanted one on affordances: type --agent rl")
+    return {"model": file_digest(path)}
+
+
 AGENTS: dict[str, AgentEntry] = {
     "cal": AgentEntry(
         make=lambda settings, dt, _: make_cal(settings, dt), camera=_cal_camera, provenance=_cal_provenance
     ),
+    "rl": AgentEntry(make=_make_rl, camera=_rl_camera, provenance=_rl_provenance),
     "oracle": AgentEntry(make=_make_oracle, camera=lambda _: None, provenance=_oracle_provenance, privileged=True),
+    "rl-oracle": AgentEntry(make=_make_rl, camera=lambda _: None, provenance=_rl_oracle_provenance, privileged=True),
 }
 
 
