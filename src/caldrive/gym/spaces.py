@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from caldrive.agents.reinforcement.actions import CARLA2017, N_CONTINUOUS
-from caldrive.agents.reinforcement.inputs import COMMANDS, N_AFFORDANCES, affordance_vector
+from caldrive.agents.reinforcement.config import CARLA2017, COMMANDS, N_AFFORDANCES, N_CONTINUOUS
+from caldrive.agents.reinforcement.inputs import affordance_vector
 from caldrive.datatypes import Observation, Truth
 from caldrive.gym.config import EnvConfig
 

@@ -14,9 +14,10 @@ from caldrive.agents.cal import OraclePerception
 from caldrive.agents.registry import SHIPPED_MODEL, agent_entry
 from caldrive.agents.reinforcement.agent import ReinforcementAgent, load_agent
 from caldrive.agents.reinforcement.checkpoint import PolicyInfo, encoder_info, load_policy, save_policy
+from caldrive.agents.reinforcement.config import PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder, load_encoder
 from caldrive.agents.reinforcement.inputs import AffordanceEye, FeatureEye, FrameEye
-from caldrive.agents.reinforcement.policy import Policy, PolicyConfig
+from caldrive.agents.reinforcement.policy import Policy
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import Affordances, CameraConfig, Command, Control, Observation, Pose
 from caldrive.driving.setup import set_up

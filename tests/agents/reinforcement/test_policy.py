@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from caldrive.agents.reinforcement.actions import control_of
-from caldrive.agents.reinforcement.inputs import FRAME, N_FRAMES
-from caldrive.agents.reinforcement.policy import Betas, Choices, Policy, PolicyConfig
+from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig
+from caldrive.agents.reinforcement.policy import Betas, Choices, Policy
 
 PAPER = PolicyConfig("frames", "carla2017", repeat=1, memory=False, hidden=512)
 

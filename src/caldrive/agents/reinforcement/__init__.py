@@ -1,1 +1,1 @@
-"""Reinforcement learning at the wheel: a policy that learnt by trial and error. Its training is `gym.learning`."""
+"""A policy at the wheel that learnt by trial and error; how it learnt is `caldrive.reinforcement`."""

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from caldrive.agents.reinforcement.config import CARLA2017, Action
 from caldrive.datatypes import Control
-
-Action = Literal["continuous", "carla2017"]
-# The paper's RL, (throttle, steering to the right): never both; below 0 the throttle brakes.
-CARLA2017 = ((0, 0), (-1, 0), (-0.5, 0), (0.5, 0), (1, 0), (0, -1), (0, -0.5), (0, 0.5), (0, 1))
-N_CONTINUOUS = 2  # throttle (below 0 the brake), and steering (+ to the left)
 
 
 def control_of(kind: Action, action: Any) -> Control:

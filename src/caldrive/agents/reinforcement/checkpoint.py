@@ -9,8 +9,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from caldrive.agents.reinforcement.config import PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder
-from caldrive.agents.reinforcement.policy import Policy, PolicyConfig
+from caldrive.agents.reinforcement.policy import Policy
 from caldrive.files import as_type
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.checkpoint import (

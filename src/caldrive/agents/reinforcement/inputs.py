@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from caldrive.agents.reinforcement.config import COMMANDS, FRAME, SIGNS
 from caldrive.compiled import Floats
 from caldrive.datatypes import (
     MAX_CENTER_DISTANCE,
     MAX_VEHICLE_DISTANCE,
     Affordances,
-    Command,
     Control,
     Image,
     Observation,
@@ -25,11 +25,6 @@ from caldrive.perception.images import check_image
 Inputs = dict[str, NDArray[Any]]  # numbers (F,), and for a policy with convolutions frames (2, H, W)
 Encode = Callable[[Image], Floats]  # an image (H, W, 3) to features (F,)
 
-COMMANDS = tuple(Command)
-SIGNS = (None, 30, 60, 90)  # km/h
-N_AFFORDANCES = 5 + len(SIGNS)
-FRAME = 84  # pixels a side of the paper's grey frames
-N_FRAMES = 2
 USUAL_SPEED = 10.0  # m/s, a speed of 1 for the policy
 
 
@@ -138,11 +133,6 @@ class PolicyInputs:
     def acted(self, control: Control) -> None:
         """Note what was decided."""
         self._last = control
-
-
-def n_own_numbers(memory: bool) -> int:
-    """How many numbers a policy is given beside what its eye sees."""
-    return 1 + 2 * memory + len(COMMANDS)
 
 
 def affordance_vector(affordances: Affordances) -> NDArray[np.float32]:

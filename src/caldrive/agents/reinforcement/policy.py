@@ -2,54 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor, nn
 from torch.distributions import Beta, Categorical
 from torch.nn.functional import softplus
 
-from caldrive.agents.reinforcement.actions import CARLA2017, N_CONTINUOUS, Action
-from caldrive.agents.reinforcement.inputs import FRAME, N_AFFORDANCES, N_FRAMES, n_own_numbers
+from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig
 
-Sees = Literal["frames", "features", "affordances"]
 SLOPE = 0.1  # of the leaky ReLUs below 0
 EDGE = 1e-6  # from the ends of a Beta distribution, where its density may be infinite
 FEW = 0.01  # what the last layer's first weights are multiplied by: at first a policy acts alike whatever it sees
 # Alphas and betas of throttle and steering at first, before the softplus: rather gas than brake, and no wild steering.
 # A car that does not move, or leaves its lane at once, finds out nothing.
 FIRST = (2.0, 3.0, 0.5, 3.0)
-
-
-@dataclass(frozen=True)
-class PolicyConfig:
-    """A policy. The header of its file keeps it."""
-
-    sees: Sees = "affordances"
-    """Two grey frames of 84 x 84 pixels through convolutions of its own, the features of a frozen encoder, or
-    affordances."""
-    action: Action = "continuous"
-    """Throttle or brake, and steering; or the nine actions of the paper's RL."""
-    repeat: int = 2
-    """Steps of 0.1 s for which a decision holds."""
-    memory: bool = True
-    """Whether it is given its last decision."""
-    hidden: int = 256
-    """Nodes of a hidden layer."""
-    n_features: int = 0
-    """Of the encoder."""
-
-    @property
-    def n_numbers(self) -> int:
-        """How many numbers it is given."""
-        seen = {"frames": 0, "features": self.n_features, "affordances": N_AFFORDANCES}
-        return seen[self.sees] + n_own_numbers(self.memory)
-
-    @property
-    def n_outputs(self) -> int:
-        """Parameters of its distribution."""
-        return len(CARLA2017) if self.action == "carla2017" else 2 * N_CONTINUOUS
 
 
 class Actions(Protocol):
@@ -76,23 +43,27 @@ class Choices:
     """The nine actions of the paper's RL, each with its probability. outputs: (N, 9)."""
 
     def __init__(self, outputs: Tensor) -> None:
-        self._chances = Categorical(logits=outputs, validate_args=False)
+        self._chances: Any = Categorical(logits=outputs, validate_args=False)
 
     def sample(self) -> Tensor:
         """(N,)."""
-        return self._chances.sample()
+        actions: Tensor = self._chances.sample()
+        return actions
 
     def best(self) -> Tensor:
         """The likeliest (N,)."""
-        return self._chances.probs.argmax(1)
+        best: Tensor = self._chances.logits.argmax(1)
+        return best
 
     def log_prob(self, actions: Tensor) -> Tensor:
         """Of actions (N,) or (N, 1)."""
-        return self._chances.log_prob(actions.reshape(-1))
+        logarithm: Tensor = self._chances.log_prob(actions.reshape(-1))
+        return logarithm
 
     def entropy(self) -> Tensor:
         """(N,)."""
-        return self._chances.entropy()
+        entropy: Tensor = self._chances.entropy()
+        return entropy
 
 
 class Betas:
@@ -101,24 +72,28 @@ class Betas:
 
     def __init__(self, outputs: Tensor) -> None:
         alpha, beta = (1 + softplus(outputs)).chunk(2, dim=1)
-        self._shares = Beta(alpha, beta, validate_args=False)
+        self._shares: Any = Beta(alpha, beta, validate_args=False)
 
     def sample(self) -> Tensor:
         """(N, 2)."""
-        return 2 * self._shares.sample() - 1
+        actions: Tensor = 2 * self._shares.sample() - 1
+        return actions
 
     def best(self) -> Tensor:
         """The means (N, 2)."""
-        return 2 * self._shares.mean - 1
+        means: Tensor = 2 * self._shares.mean - 1
+        return means
 
     def log_prob(self, actions: Tensor) -> Tensor:
         """Of actions (N, 2), but for a constant."""
         shares = ((actions + 1) / 2).clamp(EDGE, 1 - EDGE)
-        return self._shares.log_prob(shares).sum(1)
+        logarithm: Tensor = self._shares.log_prob(shares).sum(1)
+        return logarithm
 
     def entropy(self) -> Tensor:
         """(N,), but for the same constant."""
-        return self._shares.entropy().sum(1)
+        entropy: Tensor = self._shares.entropy().sum(1)
+        return entropy
 
 
 class Convolutions(nn.Module):

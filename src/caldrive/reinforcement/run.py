@@ -11,12 +11,8 @@ from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
+import gymnasium
 import numpy as np
-
-from caldrive.agents.reinforcement.policy import PolicyConfig
-from caldrive.gym.learning.config import ReinforcementConfig
-from caldrive.gym.learning.curriculum import Curriculum
-from caldrive.gym.learning.environment import LearningEnv
 
 try:
     from stable_baselines3 import PPO
@@ -27,8 +23,14 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError("found no stable-baselines3, wanted it: type pip install 'caldrive[rl]'") from error
 
+from caldrive.agents.reinforcement.config import PolicyConfig
+from caldrive.reinforcement.config import ReinforcementConfig
+from caldrive.reinforcement.curriculum import Curriculum
+from caldrive.reinforcement.policy import LearningPolicy
+
 Row = dict[str, int | float]  # an update's metrics
-MakeEnv = Callable[[], LearningEnv]
+LATER = 10**9  # updates, after which stable-baselines3 would print its figures
+MakeEnv = Callable[[], gymnasium.Env[Any, Any]]
 
 
 @dataclass(frozen=True)
@@ -56,15 +58,21 @@ class LearningRun:
         makers = [make_env] * config.environments
         several = SubprocVecEnv(makers, start_method="forkserver") if config.processes else DummyVecEnv(makers)
         self.env = VecNormalize(several, norm_obs=False, gamma=config.discount)
-        from caldrive.gym.learning.policy import LearningPolicy
-
+        kind: Any = LearningPolicy  # which has all that PPO asks of a policy
         self.model = PPO(
-            LearningPolicy, self.env, learning_rate=lambda _: self.rate, n_steps=config.rollout,
+            kind, self.env, learning_rate=lambda _: self.rate, n_steps=config.rollout,
             batch_size=config.batch, n_epochs=config.epochs, gamma=config.discount, gae_lambda=config.gae,
             clip_range=config.clip, ent_coef=config.entropy, policy_kwargs={"config": policy}, device=config.device,
             seed=derived_seed(config.seed, 0, "weights"),
         )  # fmt: skip
         self.model.set_logger(Logger(None, []))
+
+    @property
+    def learning_policy(self) -> LearningPolicy:
+        """The policy and its value, with their optimizer."""
+        policy: Any = self.model.policy
+        assert isinstance(policy, LearningPolicy)
+        return policy
 
     @property
     def steps(self) -> int:
@@ -87,9 +95,9 @@ class LearningRun:
         if self.at_save_point:
             self._begin_episodes()
         set_random_seed(derived_seed(self.config.seed, self.update, "actions"))
-        notes = _Notes()
+        notes = _Notes(self.env)
         try:
-            self.model.learn(self.config.update_steps, notes, log_interval=None, reset_num_timesteps=False)
+            self.model.learn(self.config.update_steps, notes, log_interval=LATER, reset_num_timesteps=False)
         except (EOFError, ConnectionError) as error:
             raise RuntimeError(
                 "found that the process of an environment has died, wanted all of them: see above what it said, and "
@@ -127,16 +135,17 @@ class LearningRun:
         return figures
 
 
-class _Notes(BaseCallback):  # type: ignore[misc]  # stable-baselines3 need not be there
+class _Notes(BaseCallback):
     """Notes rewards and ended episodes while decisions are collected."""
 
-    def __init__(self) -> None:
+    def __init__(self, env: VecNormalize) -> None:
         super().__init__()
+        self._env = env
         self.ended: list[Ended] = []
         self.rewards: list[float] = []
 
     def _on_step(self) -> bool:
-        self.rewards.append(float(np.mean(self.training_env.get_original_reward())))
+        self.rewards.append(float(np.mean(self._env.get_original_reward())))
         each = zip(self.locals["dones"], self.locals["infos"], strict=True)
         self.ended += [_ended(info) for done, info in each if done]
         return True

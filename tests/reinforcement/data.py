@@ -10,14 +10,14 @@ import pytest
 import caldrive.gym.env
 from caldrive.agents.reinforcement.encoder import Encoder
 from caldrive.datatypes import CameraConfig, Observation, Pose
-from caldrive.gym.learning.config import ReinforcementConfig
-from caldrive.gym.learning.environment import LearningEnv, make_learning_env
+from caldrive.reinforcement.config import ReinforcementConfig
+from caldrive.reinforcement.environment import LearningEnv, make_learning_env
 from caldrive.scenarios import Scenario
 from tests.fakes import StraightRoad
 
 ROAD = Scenario(town="road", weather=1, start=Pose(0, 0, 0), goal=Pose(40, 0, 0), time_limit=20.0)
 SHORT = ReinforcementConfig(
-    steps=256, environments=2, processes=False, rollout=32, batch=32, epochs=2, hidden=16, save_every=2, window=3,
+    steps=128, environments=2, processes=False, rollout=16, batch=16, epochs=2, hidden=16, save_every=2, window=3,
     checkpoints=2, device="cpu",
 )  # fmt: skip
 

@@ -7,14 +7,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypedDict
 
+import numpy as np
 from torch import Tensor
 
 from caldrive.agents.registry import model_path
 from caldrive.files import as_type, read_json
-from caldrive.gym.learning.config import ReinforcementConfig
-from caldrive.gym.learning.run import LearningRun
 from caldrive.perception.network.checkpoint import CheckpointError, read_tensors, write_tensors
 from caldrive.provenance import file_digest
+from caldrive.reinforcement.config import ReinforcementConfig
+from caldrive.reinforcement.run import LearningRun
 
 KIND = "reinforcement training"
 POLICY, OPTIMIZER = "policy.", "optimizer."  # what the tensors' names begin with
@@ -37,7 +38,7 @@ class Header(TypedDict):
 
 def save_state(path: Path, run: LearningRun) -> None:
     """Write a run as it is at a save point."""
-    policy = run.model.policy
+    policy = run.learning_policy
     tensors = {POLICY + name: value for name, value in policy.state_dict().items()}
     for number, moments in policy.optimizer.state_dict()["state"].items():
         tensors |= {f"{OPTIMIZER}{number}.{name}": value for name, value in moments.items()}
@@ -99,7 +100,7 @@ def _restore(run: LearningRun, tensors: dict[str, Tensor], header: Header) -> No
         raise ValueError(f"update {header['update']} of {run.config.updates}")
     if not 0 <= header["level"] < len(run.config.tasks):
         raise ValueError(f"task {header['level']} of {len(run.config.tasks)}")
-    policy = run.model.policy
+    policy = run.learning_policy
     policy.load_state_dict(_without_prefix(POLICY, tensors))
     moments: dict[int, dict[str, Tensor]] = {}  # of each parameter
     for path, value in _without_prefix(OPTIMIZER, tensors).items():
@@ -110,7 +111,8 @@ def _restore(run: LearningRun, tensors: dict[str, Tensor], header: Header) -> No
     run.update = header["update"]
     run.curriculum.level, run.curriculum.recent = header["level"], header["recent"]
     scale = run.env.ret_rms
-    scale.mean, scale.var, scale.count = header["mean"], header["variance"], header["count"]
+    scale.mean, scale.var = np.array(header["mean"]), np.array(header["variance"])
+    scale.count = header["count"]
 
 
 def _without_prefix(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:

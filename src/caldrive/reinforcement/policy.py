@@ -8,13 +8,14 @@ from stable_baselines3.common.policies import BasePolicy
 from torch import Tensor, nn
 from torch.optim import Adam
 
-from caldrive.agents.reinforcement.policy import Policy, PolicyConfig, trunk
+from caldrive.agents.reinforcement.config import PolicyConfig
+from caldrive.agents.reinforcement.policy import Policy, trunk
 
 Inputs = dict[str, Tensor]
 ADAM_EPSILON = 1e-5  # Engstrom et al. 2020, of PPO's details
 
 
-class LearningPolicy(BasePolicy):  # type: ignore[misc]  # stable-baselines3 need not be there
+class LearningPolicy(BasePolicy):
     """A `Policy` and its value. A policy with convolutions shares them with the value, as in the paper; one on numbers
     does not."""
 
@@ -44,8 +45,9 @@ class LearningPolicy(BasePolicy):  # type: ignore[misc]  # stable-baselines3 nee
         """The value (N, 1)."""
         return self._value(inputs, self.actor.trunk(inputs) if self.below_value is None else None)
 
-    def _predict(self, inputs: Inputs, deterministic: bool = False) -> Tensor:
-        return self.forward(inputs, deterministic)[0]
+    def _predict(self, observation: Tensor | Inputs, deterministic: bool = False) -> Tensor:
+        assert isinstance(observation, dict)
+        return self.forward(observation, deterministic)[0]
 
     def _value(self, inputs: Inputs, nodes: Tensor | None) -> Tensor:
         below = nodes if self.below_value is None else self.below_value(inputs)

@@ -13,12 +13,12 @@ import numpy as np
 from caldrive.agents.reinforcement.checkpoint import PolicyInfo, encoder_info, save_policy
 from caldrive.agents.reinforcement.encoder import Encoder, load_encoder
 from caldrive.files import locked_folder, write_figure
-from caldrive.gym.learning.config import ReinforcementConfig
-from caldrive.gym.learning.environment import LearningEnv, make_learning_env, policy_config
-from caldrive.gym.learning.run import LearningRun
-from caldrive.gym.learning.state import digests, plain_settings, restore_state, save_state
 from caldrive.perception.training.folder import TrainingFolder
 from caldrive.progress import Progress, silent
+from caldrive.reinforcement.config import ReinforcementConfig
+from caldrive.reinforcement.environment import LearningEnv, env_config, make_learning_env, policy_config
+from caldrive.reinforcement.run import LearningRun
+from caldrive.reinforcement.state import digests, plain_settings, restore_state, save_state
 
 SMOOTHED_UPDATES = 20  # that curves are averaged over
 MakeEnv = Callable[[ReinforcementConfig, Encoder | None], LearningEnv]
@@ -39,6 +39,7 @@ def train_rl(
     for settings that cannot be, and ValueError where another process works in `out`.
     """
     encoder = load_encoder(config.encoder) if config.encoder else None
+    env_config(config, encoder)
     folder = TrainingFolder(Path(out))
     with locked_folder(Path(out)):
         run = LearningRun(config, policy_config(config, encoder), partial(make_env, config, encoder))
@@ -85,7 +86,7 @@ def _write_policy(path: Path, run: LearningRun, encoder: Encoder | None) -> None
         run.policy, plain_settings(run.config), run.config.seed, run.steps,
         encoder_info(encoder) if encoder else None, digests(run.config).get("perception"),
     )  # fmt: skip
-    save_policy(path, run.model.policy.actor, info, encoder)
+    save_policy(path, run.learning_policy.actor, info, encoder)
 
 
 def _checkpoint(run: LearningRun) -> int | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from caldrive.gym.learning.curriculum import Curriculum
+from caldrive.reinforcement.curriculum import Curriculum
 
 TASKS = ("straight", "one-turn", "navigation")
 

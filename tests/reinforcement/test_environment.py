@@ -13,14 +13,15 @@ from caldrive.agents.reinforcement.agent import ReinforcementAgent
 from caldrive.agents.reinforcement.inputs import AffordanceEye, FrameEye, Inputs
 from caldrive.agents.reinforcement.policy import Policy
 from caldrive.datatypes import Control, Observation
-from caldrive.gym.learning.config import REINFORCEMENTS
-from caldrive.gym.learning.environment import policy_config
-from tests.gym.learning.data import ROAD, make_env, straight_road
+from caldrive.reinforcement.config import REINFORCEMENTS
+from caldrive.reinforcement.environment import policy_config
+from tests.reinforcement.data import ROAD, make_env, straight_road
 
 __all__ = ["straight_road"]
 pytestmark = pytest.mark.usefixtures("straight_road")
 
 
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 @pytest.mark.parametrize("preset", ["paper", "affordances"])
 def test_it_keeps_gymnasiums_contract(preset: str) -> None:
     check_env(make_env(REINFORCEMENTS[preset]), skip_render_check=True)
@@ -31,7 +32,7 @@ def test_the_inputs_in_training_are_those_at_the_wheel(preset: str) -> None:
     config = replace(REINFORCEMENTS[preset], hidden=8)
     policy = Policy(policy_config(config, None))
     env = make_env(config)
-    eye = FrameEye() if preset == "paper" else AffordanceEye(OraclePerception(env.env.truth))
+    eye = FrameEye() if preset == "paper" else AffordanceEye(OraclePerception(env.driving.truth))
     agent = ReinforcementAgent(policy, eye)
     given: list[Inputs] = []
     see = agent.inputs.see
@@ -45,7 +46,7 @@ def test_the_inputs_in_training_are_those_at_the_wheel(preset: str) -> None:
     agent.reset()
     for _ in range(6):
         agent._held = 0
-        control = agent.act(env.env.observation)
+        control = agent.act(env.driving.observation)
         assert given[-1].keys() == seen.keys()
         assert all((given[-1][name] == seen[name]).all() for name in seen)
         action = action_of(control) if preset == "affordances" else 4

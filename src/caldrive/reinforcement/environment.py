@@ -13,29 +13,30 @@ from caldrive.agents.cal import OraclePerception
 from caldrive.agents.registry import model_path
 from caldrive.agents.reinforcement.actions import control_of
 from caldrive.agents.reinforcement.agent import make_eye, policy_camera
+from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder
-from caldrive.agents.reinforcement.inputs import FRAME, N_FRAMES, Eye, PolicyInputs
-from caldrive.agents.reinforcement.policy import PolicyConfig
+from caldrive.agents.reinforcement.inputs import Eye, PolicyInputs
 from caldrive.datatypes import CameraConfig
 from caldrive.driving.rules import COLLISION
 from caldrive.gym.config import EnvConfig
 from caldrive.gym.env import DrivingEnv
-from caldrive.gym.learning.config import ReinforcementConfig
 from caldrive.interfaces import BadImage, Perception
 from caldrive.perception.network.checkpoint import read_info
+from caldrive.reinforcement.config import ReinforcementConfig
 from caldrive.results import InfractionKind
 
 MOST = 1e6  # of a number that a policy is given: an encoder's have no bound of their own
 
 
-class LearningEnv(gymnasium.Env[dict[str, Any], Any]):
+class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, dict[str, Any], Any]):
     """A `DrivingEnv` in which a policy learns. It sees by the same `PolicyInputs` as at the wheel.
 
     tasks: from which an episode's is drawn; may be changed, for the next episode.
     """
 
     def __init__(self, env: DrivingEnv, policy: PolicyConfig, eye: Eye) -> None:
-        self.env, self.tasks = env, env.config.tasks
+        super().__init__(env)
+        self.driving, self.tasks = env, env.config.tasks
         self._policy, self._inputs = policy, PolicyInputs(eye, policy.memory)
         self.action_space, self.observation_space = env.action_space, inputs_space(policy)
 
@@ -43,7 +44,7 @@ class LearningEnv(gymnasium.Env[dict[str, Any], Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts an episode, see `DrivingEnv.reset`."""
-        _, info = self.env.reset(seed=seed, options={"config": {"tasks": self.tasks}} | (options or {}))
+        _, info = self.driving.reset(seed=seed, options={"config": {"tasks": self.tasks}} | (options or {}))
         self._inputs.reset()
         return self._see(), info
 
@@ -53,38 +54,37 @@ class LearningEnv(gymnasium.Env[dict[str, Any], Any]):
         for k in range(self._policy.repeat):
             if k:
                 self._watch()
-            _, reward, terminated, truncated, info = self.env.step(action)
+            _, reward, terminated, truncated, info = self.driving.step(action)
             total += reward
             if terminated or truncated:
                 break
         self._inputs.acted(control_of(self._policy.action, action))
         return self._see(), total, terminated, truncated, info
 
-    def close(self) -> None:
-        """Ends the world."""
-        self.env.close()
-
     def _watch(self) -> None:
         with suppress(BadImage):  # the policy sees what it saw before; at the wheel the agent brakes
-            self._inputs.watch(self.env.observation)
+            self._inputs.watch(self.driving.observation)
 
     def _see(self) -> dict[str, Any]:
         self._watch()
-        return self._inputs.see(self.env.observation)
+        return self._inputs.see(self.driving.observation)
 
 
 def make_learning_env(config: ReinforcementConfig, encoder: Encoder | None) -> LearningEnv:
     """An environment for a training."""
-    policy = policy_config(config, encoder)
+    policy, env = policy_config(config, encoder), DrivingEnv(env_config(config, encoder))
+    return LearningEnv(env, policy, make_eye(policy, encoder, lambda: _perception(config, env)))
+
+
+def env_config(config: ReinforcementConfig, encoder: Encoder | None) -> EnvConfig:
+    """The driving that a policy learns from. Raises ValueError for a task or a reward that there is not."""
     draws = config.sees != "affordances" or config.affordances == "predicted"
     ends = (*COLLISION.values(), *((InfractionKind.SIDEWALK,) if config.early_ends else ()))
-    settings = EnvConfig(
+    return EnvConfig(
         towns=config.towns, weathers=config.weathers, tasks=config.tasks, action=config.action, reward=config.reward,
         observation="image" if draws else "affordances", camera=_camera(config, encoder), ends=ends,
         leaves_route=config.early_ends,
     )  # fmt: skip
-    env = DrivingEnv(settings)
-    return LearningEnv(env, policy, make_eye(policy, encoder, lambda: _perception(config, env)))
 
 
 def _camera(config: ReinforcementConfig, encoder: Encoder | None) -> CameraConfig:
