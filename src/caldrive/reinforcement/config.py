@@ -69,7 +69,8 @@ class ReinforcementConfig:
     """Share of goals reached in the present task's last episodes at which it moves on; 0 has all tasks from the first
     episode on."""
     early_ends: bool = True
-    """Whether an episode ends not only at a collision, but also on the sidewalk and 2 m beside its route."""
+    """Whether an episode ends not only at a collision, but also at a red light, on the sidewalk and 2 m beside its
+    route."""
     window: int = 50
     """Episodes that this share is taken over."""
     environments: int = 4

@@ -25,6 +25,7 @@ from caldrive.perception.network.checkpoint import read_info
 from caldrive.reinforcement.config import ReinforcementConfig
 from caldrive.results import InfractionKind
 
+EARLY_ENDS = (InfractionKind.SIDEWALK, InfractionKind.RED_LIGHT)
 MOST = 1e6  # of a number that a policy is given: an encoder's have no bound of their own
 
 
@@ -79,7 +80,7 @@ def make_learning_env(config: ReinforcementConfig, encoder: Encoder | None) -> L
 def env_config(config: ReinforcementConfig, encoder: Encoder | None) -> EnvConfig:
     """The driving that a policy learns from. Raises ValueError for a task or a reward that there is not."""
     draws = config.sees != "affordances" or config.affordances == "predicted"
-    ends = (*COLLISION.values(), *((InfractionKind.SIDEWALK,) if config.early_ends else ()))
+    ends = (*COLLISION.values(), *(EARLY_ENDS if config.early_ends else ()))
     return EnvConfig(
         towns=config.towns, weathers=config.weathers, tasks=config.tasks, action=config.action, reward=config.reward,
         observation="image" if draws else "affordances", camera=_camera(config, encoder), ends=ends,
