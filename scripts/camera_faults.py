@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from caldrive.agents.cal import CALAgent
-from caldrive.agents.registry import model_path
+from caldrive.agents.rows import model_path
 from caldrive.control.presets import make_controller
 from caldrive.datatypes import KMH, CameraConfig, Control, Observation
 from caldrive.driving.referee import Referee

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from caldrive.agents.cal import CALAgent, OraclePerception
-from caldrive.agents.registry import SHIPPED_MODEL
+from caldrive.agents.rows import SHIPPED_MODEL
 from caldrive.benchmark.episode_metrics import EpisodeMetrics
 from caldrive.benchmark.suites import SUITES, suite, to_json
 from caldrive.collection.config import CollectConfig

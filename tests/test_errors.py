@@ -125,9 +125,7 @@ def test_damaged_files_are_named_one_by_one(folder: Path, capsys: pytest.Capture
 def test_cal_without_a_model_says_what_else_to_type(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from caldrive.agents import registry as drivers
-
-    monkeypatch.setattr(drivers, "SHIPPED_MODEL", folder / "gone.safetensors")
+    monkeypatch.setattr("caldrive.agents.rows.MODELS", folder / "gone")
     assert main(["drive"]) == 2
     said = capsys.readouterr().err
     assert "--agent oracle" in said

@@ -22,7 +22,7 @@ import tyro
 from tyro import _errors  # its one way to hear of a mistake before it is printed in a box; pinned in pyproject.toml
 
 from caldrive import __version__
-from caldrive.commands import GROUPS, VERBS, Answer, command_type, verb_words
+from caldrive.commands import GROUPS, VERBS, Answer, command_type, verb_kind, verb_words
 from caldrive.config import from_toml
 from caldrive.progress import only_answers_on_stdout, progress_bar, readable_width
 
@@ -87,14 +87,16 @@ def parse(arguments: Sequence[str]) -> Any:
     if unusable := [word for word in arguments if "\0" in word]:
         raise ValueError(f"found {unusable[0]!r}, wanted words without a null byte: type another")
     verb = verb_words(arguments)
-    defaults = {verb: _defaults(verb, arguments)} if verb in VERBS else {}
+    kinds = {verb: verb_kind(verb, _value(arguments, "--agent"))} if verb in VERBS else {}
+    defaults = {verb: _defaults(kind, arguments) for verb, kind in kinds.items()}
     with _errors.on_parse_error(lambda event: _refuse(event, verb)):
-        return tyro.cli(command_type(defaults), prog="caldrive", description=DESCRIPTION, args=arguments, config=STYLE)
+        return tyro.cli(
+            command_type(kinds, defaults), prog="caldrive", description=DESCRIPTION, args=arguments, config=STYLE
+        )
 
 
-def _defaults(verb: str, arguments: Sequence[str]) -> Any:
-    """The verb's options before the command line changes them: a preset's, and those in a TOML file."""
-    kind = VERBS[verb].kind
+def _defaults(kind: type[Any], arguments: Sequence[str]) -> Any:
+    """A verb's options before the command line changes them: a preset's, and those in a TOML file. kind: its class."""
     presets = getattr(kind, "PRESETS", {})
     name = _value(arguments, "--preset") if presets else None
     file = _value(arguments, "--config") if hasattr(kind, "config") else None

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from caldrive.agents.cal import CALAgent
-from caldrive.agents.registry import SHIPPED_MODEL, agent_entry
+from caldrive.agents.registry import agent_entry
+from caldrive.agents.rows import SHIPPED_MODEL
 from caldrive.agents.settings import AgentSettings
 from caldrive.driving.setup import set_up
 from caldrive.driving.tasks import task_scenarios

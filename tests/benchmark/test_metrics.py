@@ -9,11 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.benchmark.metrics import (
+    Pair,
     cells,
     driving_score,
     infraction_rates,
     mean_comfort,
     mean_errors,
+    paired,
     red_light_counts,
     route_completion,
     speeding,
@@ -54,6 +56,22 @@ def test_wilsons_interval_holds_the_rate_and_mirrors(n: int, data: st.DataObject
     assert 0 <= low <= k / n + 1e-9
     assert k / n - 1e-9 <= high <= 1
     assert wilson(n - k, n) == pytest.approx((1 - high, 1 - low), abs=1e-9)
+
+
+def test_two_agents_are_compared_in_the_episodes_that_both_drove() -> None:
+    won, lost = Outcome.SUCCESS, Outcome.TIMEOUT
+    first = [driven(outcome, seed=seed) for seed, outcome in enumerate((won, won, won, lost, lost, won))]
+    second = [driven(outcome, seed=seed) for seed, outcome in enumerate((won, lost, lost, won, lost))]
+    pair = paired(first, second)
+    assert (pair.both, pair.first_alone, pair.second_alone, pair.neither, pair.episodes) == (1, 2, 1, 1, 5)
+    assert pair.p_value == 1.0
+
+
+# By hand: twice the tail of a fair coin thrown as often as the two differ.
+@pytest.mark.parametrize(("alone", "p"), [((0, 0), 1.0), ((5, 0), 2 / 32), ((0, 10), 2 / 1024), ((8, 2), 112 / 1024)])
+def test_mcnemars_test_is_exact(alone: tuple[int, int], p: float) -> None:
+    first, second = alone
+    assert Pair(both=50, first_alone=first, second_alone=second, neither=3).p_value == pytest.approx(p)
 
 
 def test_cells_count_by_condition_and_task() -> None:

@@ -117,7 +117,8 @@ def test_cal_drives_from_the_image_and_its_trace_tells_seen_from_true(model: str
 
 
 def test_an_image_that_tells_nothing_brakes_to_a_stand_and_says_why(model: str) -> None:
-    from caldrive.agents.registry import agent_entry, make_cal
+    from caldrive.agents.registry import agent_entry
+    from caldrive.agents.rows import make_cal
 
     settings = AgentSettings(model=Path(model))
     agent, camera = make_cal(settings, 0.1), agent_entry("cal").camera(settings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median, stdev
@@ -59,6 +60,34 @@ def wilson(successes: int, n: int) -> tuple[float, float]:
     middle = (share + z / 2) / (1 + z)
     half = math.sqrt(z * share * (1 - share) + z**2 / 4) / (1 + z)
     return max(0.0, middle - half), min(1.0, middle + half)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two agents in the same episodes: how many goals each of them reached in time."""
+
+    both: int
+    first_alone: int
+    second_alone: int
+    neither: int
+
+    @property
+    def episodes(self) -> int:
+        """How many both drove."""
+        return self.both + self.first_alone + self.second_alone + self.neither
+
+    @property
+    def p_value(self) -> float:
+        """McNemar's exact test, two-sided: how likely a difference as large is between two that are as good."""
+        differ, fewer = self.first_alone + self.second_alone, min(self.first_alone, self.second_alone)
+        return min(1.0, 2 * sum(math.comb(differ, k) for k in range(fewer + 1)) * 0.5**differ)
+
+
+def paired(first: Iterable[TrialResult], second: Iterable[TrialResult]) -> Pair:
+    """Two agents' results in the episodes that both drove."""
+    ours, theirs = ({result.trial.scenario: succeeded(result) for result in results} for results in (first, second))
+    counts = Counter((ours[episode], theirs[episode]) for episode in ours.keys() & theirs.keys())
+    return Pair(*(counts[pair] for pair in ((True, True), (True, False), (False, True), (False, False))))
 
 
 def by_condition(results: Iterable[TrialResult]) -> dict[str, list[TrialResult]]:

@@ -33,8 +33,12 @@ _KM = {
     InfractionKind.COLLISION_PERSON:
         "18.9 6.35 17.8 30.3 | 20.4 11.2 20.6 >60 | 1.40 1.88 2.55 26.49 | 1.46 1.41 2.00 6.72",
 }  # fmt: skip
-# Supplement 3.2, CAL: median distance to the centre line (m), RMS jerk (m/s³).
-COMFORT = {"center_distance": 0.334, "jerk": 0.333, "lateral_straight": 0.052, "lateral_turn": 0.065}
+# Supplement 3.2: median distance to the centre line (m), RMS jerk (m/s³); MP was not measured.
+COMFORT = {
+    "CIL": {"center_distance": 0.390, "jerk": 0.449, "lateral_straight": 0.084, "lateral_turn": 0.242},
+    "RL": {"center_distance": 0.755, "jerk": 1.368, "lateral_straight": 0.336, "lateral_turn": 0.548},
+    "CAL": {"center_distance": 0.334, "jerk": 0.333, "lateral_straight": 0.052, "lateral_turn": 0.065},
+}
 
 
 def success(system: str, condition: str, task: str) -> int | None:

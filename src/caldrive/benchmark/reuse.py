@@ -15,7 +15,10 @@ from caldrive.files import json_line
 from caldrive.results import EpisodeResult, Outcome, result_from_values
 from caldrive.scenarios import Scenario
 
-SAME = ("agent", "agent_source", "controller", "controller_source", "cap", "blind", "code", "model", "precision")
+SAME = (
+    "agent", "agent_source", "controller", "controller_source", "cap", "blind", "truth", "variant", "code", "model",
+    "precision",
+)  # fmt: skip
 
 
 def reusable_records(

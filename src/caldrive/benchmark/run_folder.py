@@ -43,6 +43,8 @@ class RunDescription(TypedDict):
     controller_source: NotRequired[str | None]
     cap: float | None
     blind: NotRequired[list[str] | None]
+    truth: NotRequired[list[str] | None]
+    variant: NotRequired[str | None]
     time_limit: str
     seed: int
     code: str
@@ -86,7 +88,7 @@ def run_identity(settings: BenchmarkSettings, trials: Sequence[Trial], driven_by
         "suite": str(own_suite.resolve()) if own_suite else settings.suite,
         "suite_content": suite_digest(own_suite, trials) if own_suite else None,
         "agent": driver.agent, "controller": driver.controller, "cap": driver.cap,
-        "blind": list(driver.blind) or None,
+        "blind": list(driver.blind) or None, "truth": list(driver.truth) or None, "variant": driver.variant,
         "time_limit": settings.time_limit, "seed": settings.seed, **driven_by,
     }  # fmt: skip
 
@@ -130,6 +132,8 @@ class RunFolder:
             controller=about["controller"],
             cap=about["cap"],
             blind=tuple(about.get("blind") or ()),
+            truth=tuple(about.get("truth") or ()),
+            variant=about.get("variant"),
         )
 
     @cached_property

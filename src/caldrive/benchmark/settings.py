@@ -43,4 +43,6 @@ class BenchmarkSettings(AgentSettings):
             controller=full_name(self.controller),
             cap=None if self.signs else self.cap,
             blind=self.blind,
+            truth=self.truth,
+            variant=self.variant,
         )

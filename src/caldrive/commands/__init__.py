@@ -17,12 +17,13 @@ from caldrive.commands.answer import Answer
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Data
 from caldrive.commands.drive import Determinism, Drive
+from caldrive.commands.explain import Blame
 from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
 from caldrive.commands.train import Evaluate, Train
 
-__all__ = ["GROUPS", "VERBS", "Answer", "command_type", "verb_words"]
+__all__ = ["GROUPS", "VERBS", "Answer", "command_type", "verb_kind", "verb_words"]
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,10 @@ VERBS: Mapping[str, Verb] = {
     "benchmark": Verb(Benchmark, "Drive a whole suite, and count."),
     "replay": Verb(Replay, "Drive a benchmark's episode again, and film it."),
     "report": Verb(Report, "Tables and a page on one or more benchmarks."),
+    "blame": Verb(Blame, "Say which affordance is to blame for a benchmark's failures."),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
-    "train": Verb(Train, "Train the network on a recording."),
+    "train": Verb(Train, "Train an agent's network on a recording."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
@@ -56,17 +58,33 @@ def verb_words(arguments: Sequence[str]) -> str:
     return " ".join(arguments[: 2 if arguments and arguments[0] in GROUPS else 1])
 
 
-def command_type(defaults: Mapping[str, Any]) -> Any:
-    """All verbs as one type for the parser. defaults: a verb's options where they are not the usual ones."""
-    choices = [_choice(name, defaults) for name in VERBS if " " not in name]
+def verb_kind(verb: str, agent: str | None) -> type[Any]:
+    """The class of a verb; where it is another one for each agent, that of the agent asked for. Raises ValueError where
+    there is none for it."""
+    kind = VERBS[verb].kind
+    kinds: Mapping[str, type[Any]] = getattr(kind, "BY_AGENT", {})
+    if agent is None or not kinds:
+        return kind
+    if agent not in kinds:
+        raise ValueError(
+            f"found agent {agent!r}, wanted one of {', '.join(kinds)} for caldrive {verb}: type --agent {min(kinds)}"
+        )
+    return kinds[agent]
+
+
+def command_type(kinds: Mapping[str, type[Any]], defaults: Mapping[str, Any]) -> Any:
+    """All verbs as one type for the parser. kinds: a verb's class, where it is not that of its row; defaults: its
+    options, where they are not the usual ones."""
+    choices = [_choice(name, kinds, defaults) for name in VERBS if " " not in name]
     for group, description in GROUPS.items():
-        inside = [_choice(name, defaults) for name in VERBS if name.startswith(f"{group} ")]
+        inside = [_choice(name, kinds, defaults) for name in VERBS if name.startswith(f"{group} ")]
         choices.append(Annotated[reduce(or_, inside), subcommand(group, description=description)])
     return reduce(or_, choices)
 
 
-def _choice(name: str, defaults: Mapping[str, Any]) -> Any:
-    verb, more = VERBS[name], {}
+def _choice(name: str, kinds: Mapping[str, type[Any]], defaults: Mapping[str, Any]) -> Any:
+    verb, more = VERBS[name], dict[str, Any]()
     if defaults.get(name) is not None:
         more["default"] = defaults[name]
-    return Annotated[verb.kind, subcommand(name.rpartition(" ")[2], description=verb.description, **more)]
+    about = subcommand(name.rpartition(" ")[2], description=verb.description, **more)
+    return Annotated[kinds.get(name, verb.kind), about]

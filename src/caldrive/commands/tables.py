@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.benchmark.suites import TrialResult
     from caldrive.driving.drive import DriveReport
     from caldrive.driving.speed import WorldTiming
+    from caldrive.explain.blame import Blame
     from caldrive.perception.evaluation.report import Report
     from caldrive.recordings.check import RecordingSummary
 
@@ -183,3 +184,14 @@ def _confusion(name: str, report: Report) -> Table:
     for c, row, iou in zip(classes, report.confusion[name], report.class_iou[name], strict=True):
         table.add_row(str(c), *map(str, row), _figure(iou, 100))
     return table
+
+
+def blame_table(blame: Blame, name: str, episodes: int) -> Group:
+    """A row for each affordance, and for what none of them is to blame for."""
+    failures = len(blame.failures)
+    table = Table("affordance", "rescued by its truth", "fail with it alone seen", box=SIMPLE_HEAD)
+    for spec in SPECS:
+        table.add_row(spec.title, str(len(blame.rescued[spec.name])), str(len(blame.spoilt[spec.name])))
+    table.add_row("all of them", str(len(blame.rescued["all"])), "")
+    table.add_row("controller and world", "", str(len(blame.rest)))
+    return Group(Text(f"{name}: {failures} of {episodes} episodes went wrong"), table)

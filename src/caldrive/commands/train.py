@@ -4,22 +4,33 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import FlagConversionOff, arg
 
-from caldrive.commands.answer import Answer, Configurable, Output
+from caldrive.agents.conditional_imitation.config import (
+    IMITATION_NETWORKS,
+    IMITATION_TRAININGS,
+    ImitationConfig,
+    ImitationNetworkConfig,
+)
+from caldrive.commands.answer import TYPED, Answer, Configurable, Output
 from caldrive.perception.network.config import NETWORKS, NetworkConfig
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
 from caldrive.progress import Progress
+from caldrive.reinforcement.config import REINFORCEMENTS, ReinforcementConfig
 
 
 @dataclass(frozen=True, kw_only=True)
 class Train(Configurable):
-    """Train the network on a recording; a run that was stopped goes on."""
+    """Train CAL's network on a recording; a run that was stopped goes on."""
 
     PRESETS: ClassVar[dict[str, Train]] = {}
+    BY_AGENT: ClassVar[dict[str, type[Any]]] = {}
 
+    agent: Literal["cal"] = field(default="cal", metadata=TYPED)
+    """Whose network: cal; or cil (conditional imitation learning) or rl (reinforcement learning), which have options of
+    their own: caldrive train --agent rl --help."""
     data: Path = Path("out/recording")
     """Folder with the recorded episodes."""
     out: Path = Path("out/training")
@@ -51,6 +62,77 @@ class Train(Configurable):
         return Answer({"model": str(model), "new_blocks": new_blocks}, "\n".join(lines))
 
 
+@dataclass(frozen=True, kw_only=True)
+class TrainImitation(Configurable):
+    """Train the network of conditional imitation learning on a recording; a run that was stopped goes on."""
+
+    PRESETS: ClassVar[dict[str, TrainImitation]] = {}
+
+    agent: Literal["cil"] = field(default="cil", metadata=TYPED)
+    """Whose network."""
+    data: Path = Path("out/recording")
+    """Folder with the recorded episodes."""
+    out: Path = Path("out/imitation")
+    """Folder for model.safetensors, the state of the run, its metrics and their curves."""
+    preset: str = "published"
+    """What all other options begin with: published, or cal-backbone: CAL's convolutions, augmentation and rate."""
+    training: Annotated[ImitationConfig, arg(name=""), FlagConversionOff] = field(
+        default=IMITATION_TRAININGS["published"], metadata={"flat": True}
+    )
+    network: Annotated[ImitationNetworkConfig, FlagConversionOff] = IMITATION_NETWORKS["published"]
+    """The network that is trained."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Trains; answers with the network's file."""
+        from caldrive.agents.conditional_imitation.learner import train_imitation
+        from caldrive.checks import require_writable_folder
+        from caldrive.perception.training.distributed import keep_freed_memory
+
+        require_writable_folder(self.out)
+        keep_freed_memory()
+        model = train_imitation(self.training, self.data, self.out, self.network, progress)
+        return Answer({"model": str(model)}, f"trained: caldrive drive --agent cil --model {model}")
+
+
+TrainImitation.PRESETS.update(
+    {
+        name: TrainImitation(preset=name, training=IMITATION_TRAININGS[name], network=IMITATION_NETWORKS[name])
+        for name in IMITATION_TRAININGS
+    }
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainReinforcement(Configurable):
+    """Train a policy by trial and error in the embedded town; a run that was stopped goes on."""
+
+    PRESETS: ClassVar[dict[str, TrainReinforcement]] = {}
+
+    agent: Literal["rl"] = field(default="rl", metadata=TYPED)
+    """Whose policy."""
+    out: Path = Path("out/reinforcement")
+    """Folder for model.safetensors, the state of the run, checkpoints, its metrics and their curves."""
+    preset: str = "modern"
+    """What all other options begin with: paper, as the CARLA paper's RL; modern, over a frozen encoder; affordances, on
+    the true ones; or predicted, on those of CAL's network."""
+    training: Annotated[ReinforcementConfig, arg(name=""), FlagConversionOff] = field(
+        default=REINFORCEMENTS["modern"], metadata={"flat": True}
+    )
+
+    def run(self, progress: Progress) -> Answer:
+        """Trains; answers with the policy's file."""
+        from caldrive.checks import require_writable_folder
+        from caldrive.reinforcement.train import train_rl
+
+        require_writable_folder(self.out)
+        model = train_rl(self.training, self.out, progress)
+        return Answer({"model": str(model)}, f"trained: caldrive drive --agent rl --model {model}")
+
+
+TrainReinforcement.PRESETS.update(
+    {name: TrainReinforcement(preset=name, training=REINFORCEMENTS[name]) for name in REINFORCEMENTS}
+)
+Train.BY_AGENT.update(cal=Train, cil=TrainImitation, rl=TrainReinforcement)
 Train.PRESETS.update({name: Train(preset=name, training=TRAININGS[name], network=NETWORKS[name]) for name in TRAININGS})
 
 
@@ -71,7 +153,7 @@ class Evaluate(Output):
 
     def run(self, progress: Progress) -> Answer:
         """Evaluates; answers with IoU and errors beside the paper's."""
-        from caldrive.agents.registry import model_path
+        from caldrive.agents.rows import model_path
         from caldrive.checks import require_writable_file
         from caldrive.commands.tables import evaluation_table
         from caldrive.perception.dataset.frames import Frames

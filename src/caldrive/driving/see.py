@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from PIL import Image as Picture
 
 from caldrive.affordances import SPECS
-from caldrive.agents.registry import model_path
+from caldrive.agents.rows import model_path
 from caldrive.checks import require_within, require_writable_file
 from caldrive.datatypes import Affordances, Command, Image, Observation
 from caldrive.driving.pictures import USUAL_RATE, PictureSource, SourcePicture, open_source

@@ -5,8 +5,8 @@ from __future__ import annotations
 from numbers import Real
 from typing import Any
 
-from caldrive.agents.blind import blinded
 from caldrive.agents.registry import agent_entry
+from caldrive.agents.senses import with_senses
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import CameraConfig
 from caldrive.driving.own_code import truth_of
@@ -61,8 +61,9 @@ def set_up(settings: AgentSettings, world_name: str = "embedded", images: bool =
     camera = entry.camera(settings) or (CameraConfig() if images else None)
     world = make_world(world_name, camera)
     try:
-        agent = entry.make(settings, world.dt, (lambda: truth_of(world)) if entry.privileged else None)
-        return world, blinded(agent, settings.blind)
+        knows = (lambda: truth_of(world)) if entry.privileged or settings.truth else None
+        agent = entry.make(settings, world.dt, knows if entry.privileged else None)
+        return world, with_senses(agent, settings.blind, settings.truth, knows)
     except BaseException:
         world.close()
         raise

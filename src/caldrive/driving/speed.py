@@ -15,7 +15,8 @@ from time import perf_counter
 
 import numpy as np
 
-from caldrive.agents.registry import agent_entry, make_cal
+from caldrive.agents.registry import agent_entry
+from caldrive.agents.rows import make_cal
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within
 from caldrive.control.controller import CALController, ControlConfig
 from caldrive.datatypes import DT, KMH, CameraConfig, Observation

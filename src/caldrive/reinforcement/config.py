@@ -48,7 +48,8 @@ class ReinforcementConfig:
     perception: Path | None = None
     """The network whose affordances it sees, a .safetensors file; without it the one in the package."""
     encoder: Path | None = None
-    """The network whose backbone is the frozen encoder, a .safetensors file."""
+    """The modular pipeline's network whose backbone is the frozen encoder, a .safetensors file; without it the one in
+    the package."""
     action: Action = "continuous"
     """Throttle or brake, and steering, by Beta distributions; or the nine actions of the paper's RL."""
     repeat: int = 2
@@ -115,11 +116,11 @@ class ReinforcementConfig:
                 f"found updates of {self.rollout * self.environments} decisions, wanted a multiple of the batch of "
                 f"{self.batch}: type --rollout {self.batch}"
             )
-        if (self.sees == "features") != (self.encoder is not None):
-            raise ValueError(
-                f"found --sees {self.sees} and --encoder {self.encoder}, wanted an encoder where the policy sees its "
-                "features, and none elsewhere: give both or leave out both"
-            )
+        for name, sees in (("encoder", "features"), ("perception", "affordances")):
+            if getattr(self, name) is not None and self.sees != sees:
+                raise ValueError(
+                    f"found --{name} {getattr(self, name)}, but a policy that sees {self.sees} has none: leave it out"
+                )
 
     @property
     def update_steps(self) -> int:
@@ -151,7 +152,7 @@ REINFORCEMENTS = {
         final_rate=0.0,
     ),
     # As one would today: a frozen encoder, throttle and steering at once, Roach's reward, a curriculum.
-    "modern": ReinforcementConfig(steps=3_000_000, sees="features", encoder=Path("models/mp.safetensors")),
+    "modern": ReinforcementConfig(steps=3_000_000, sees="features"),
     # The modern one on CAL's six numbers in place of an image: the true ones, or its network's.
     "affordances": ReinforcementConfig(),
     "predicted": ReinforcementConfig(affordances="predicted"),

@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 import numpy as np
 from torch import Tensor
 
-from caldrive.agents.registry import model_path
+from caldrive.agents.rows import model_path
 from caldrive.files import as_type, read_json
 from caldrive.perception.network.checkpoint import CheckpointError, read_tensors, write_tensors
 from caldrive.provenance import file_digest
@@ -78,7 +78,9 @@ def plain_settings(config: ReinforcementConfig) -> dict[str, Any]:
 
 def digests(config: ReinforcementConfig) -> dict[str, str]:
     """Of the networks that a training sees by, by their setting."""
-    files = {"encoder": config.encoder} if config.encoder else {}
+    files = {}
+    if config.sees == "features":
+        files["encoder"] = model_path(config.encoder, "mp")
     if config.sees == "affordances" and config.affordances == "predicted":
         files["perception"] = model_path(config.perception)
     return {name: file_digest(path) for name, path in files.items()}

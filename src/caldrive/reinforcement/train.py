@@ -12,6 +12,7 @@ import numpy as np
 
 from caldrive.agents.reinforcement.checkpoint import PolicyInfo, encoder_info, save_policy
 from caldrive.agents.reinforcement.encoder import Encoder, load_encoder
+from caldrive.agents.rows import model_path
 from caldrive.files import locked_folder, write_figure
 from caldrive.perception.training.folder import TrainingFolder
 from caldrive.progress import Progress, silent
@@ -38,7 +39,7 @@ def train_rl(
     called unfinished.safetensors. `stop` may end the run early after an update. Raises ValueError or FileNotFoundError
     for settings that cannot be, and ValueError where another process works in `out`.
     """
-    encoder = load_encoder(config.encoder) if config.encoder else None
+    encoder = load_encoder(model_path(config.encoder, "mp")) if config.sees == "features" else None
     env_config(config, encoder)
     folder = TrainingFolder(Path(out))
     with locked_folder(Path(out)):

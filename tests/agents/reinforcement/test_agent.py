@@ -11,13 +11,14 @@ import pytest
 import torch
 
 from caldrive.agents.cal import OraclePerception
-from caldrive.agents.registry import SHIPPED_MODEL, agent_entry
+from caldrive.agents.registry import agent_entry
 from caldrive.agents.reinforcement.agent import ReinforcementAgent, load_agent
 from caldrive.agents.reinforcement.checkpoint import PolicyInfo, encoder_info, load_policy, save_policy
 from caldrive.agents.reinforcement.config import PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder, load_encoder
 from caldrive.agents.reinforcement.inputs import AffordanceEye, FeatureEye, FrameEye
 from caldrive.agents.reinforcement.policy import Policy
+from caldrive.agents.rows import SHIPPED_MODEL
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import Affordances, CameraConfig, Command, Control, Observation, Pose
 from caldrive.driving.setup import set_up
@@ -136,7 +137,7 @@ def test_a_policy_and_its_encoder_come_back_from_their_file(tmp_path: Path) -> N
 def test_an_encoder_is_read_from_the_modular_pipelines_file(tmp_path: Path) -> None:
     encoder = small_encoder()
     tensors = {f"backbone.{name}": value for name, value in encoder.backbone.state_dict().items()}
-    config = {"width": 0.05, "batch_norm": True, "image_width": 64, "image_height": 64}
+    config = {"width": 0.05, "image_width": 64, "image_height": 64}
     path = tmp_path / "mp.safetensors"
     write_tensors(path, tensors, {"kind": "mp", "config": config, "ranges": []})
     images = torch.rand(1, 3, 64, 64)
@@ -169,7 +170,7 @@ def test_weights_that_do_not_fit_or_are_not_numbers_are_refused(tmp_path: Path) 
 
 
 def test_without_a_policy_it_is_said_what_to_type() -> None:
-    with pytest.raises(FileNotFoundError, match="found no policy in this package"):
+    with pytest.raises(FileNotFoundError, match=r"wanted one for the agent rl: .*train --agent rl"):
         set_up(AgentSettings(agent="rl"))
 
 

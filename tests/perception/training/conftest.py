@@ -19,7 +19,7 @@ def _one_thread() -> None:
 def _no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Half of a tiny training's time would go into its curves, which test_folder.py draws."""
     monkeypatch.setattr(
-        "caldrive.perception.training.train.draw_curves", lambda rows, path: path.write_bytes(b"curves")
+        "caldrive.perception.training.folder.draw_curves", lambda rows, figures, path: path.write_bytes(b"curves")
     )
 
 

@@ -34,6 +34,6 @@ def test_tensorboard_finds_the_figures(folder: Path, tmp_path: Path) -> None:
 def test_curves_are_drawn_where_some_steps_were_validated(tmp_path: Path) -> None:
     rows: list[dict[str, float]] = [{"step": step, "loss": 1 / step} for step in range(1, 61)]
     rows[-1] |= {"validation/loss": 0.5, "validation/red_light/iou": 0.9}
-    draw_curves(rows, tmp_path / "curves.png")
+    draw_curves(rows, ("loss", "red_light/iou"), tmp_path / "curves.png")
     with Image.open(tmp_path / "curves.png") as picture:
         assert picture.size > (1000, 400)

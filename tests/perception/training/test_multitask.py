@@ -15,6 +15,7 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.network.network import Network
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.perception.training.distributed import ProcessGroup
+from caldrive.perception.training.loop import TrainingFrames
 from caldrive.perception.training.multitask import (
     CELL,
     SEGMENTATION,
@@ -23,7 +24,8 @@ from caldrive.perception.training.multitask import (
     SegmentationHead,
     segmentation_loss,
 )
-from caldrive.perception.training.run import start_run
+from caldrive.perception.training.run import TrainingRun
+from caldrive.perception.training.train import start
 from caldrive.recordings.folder import find_episodes
 from tests.perception.data import HEIGHT, TINY, WIDTH, record
 
@@ -53,18 +55,18 @@ def test_in_the_mean_a_cell_is_asked_for_the_shares_of_its_classes() -> None:
 def test_segmentation_is_learnt_where_there_are_semantic_images(tmp_path: Path) -> None:
     config = TrainingConfig(batch=4, warm_up=1, precision="fp32")
     plain = Frames(find_episodes(record(tmp_path / "plain")), (HEIGHT, WIDTH))
-    assert start_run(config, TINY, plain, ProcessGroup()).model.segmentation is None
+    assert start(config, TINY, TrainingFrames(plain, plain), "cpu").model.segmentation is None
     semantic = Frames(find_episodes(record(tmp_path / "semantic", semantic=True), semantic=True), (HEIGHT, WIDTH))
-    run = start_run(config, TINY, semantic, ProcessGroup())
-    assert run.model.segmentation is not None
-    outputs = run.model(torch.randn(2, 3, HEIGHT, WIDTH), torch.tensor([[0], [1]]), torch.zeros(2, 1).long())
+    learner = start(config, TINY, TrainingFrames(semantic, semantic), "cpu")
+    assert learner.model.segmentation is not None
+    outputs = learner.model(torch.randn(2, 3, HEIGHT, WIDTH), torch.tensor([[0], [1]]), torch.zeros(2, 1).long())
     semantics = np.zeros((2, HEIGHT, WIDTH), np.uint8)
     segmentation_loss(outputs[SEGMENTATION], semantics, Generator()).backward()
-    learning = [conv.weight.grad is not None for conv in run.network.backbone.convolutions()]
+    learning = [conv.weight.grad is not None for conv in learner.network.backbone.convolutions()]
     assert learning == [True] * 10 + [False] * 3  # the last stage lies behind the head
-    before = run.model.segmentation.head.weight.clone()
-    run.advance()
-    assert not torch.equal(run.model.segmentation.head.weight, before)
+    before = learner.model.segmentation.head.weight.clone()
+    TrainingRun(learner, ProcessGroup()).advance()
+    assert not torch.equal(learner.model.segmentation.head.weight, before)
 
 
 @pytest.mark.parametrize("segmentation", [False, True])

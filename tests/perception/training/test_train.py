@@ -14,7 +14,8 @@ from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import evaluate
 from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_tensors
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
-from caldrive.perception.training.train import _read_frames, train
+from caldrive.perception.training.loop import read_frames
+from caldrive.perception.training.train import train
 from caldrive.recordings.folder import find_episodes, split
 from caldrive.recordings.writer import EpisodeError
 from tests.perception.data import HEIGHT, HISTORY, SCENARIO, SHORT, TINY, WIDTH, record
@@ -84,9 +85,9 @@ def test_a_network_that_was_removed_and_whose_blocks_were_killed_comes_again(fol
 
 
 def test_only_frames_that_train_carry_semantic_images(tmp_path: Path) -> None:
-    training, validation = _read_frames(SHORT, TINY, record(tmp_path, n_frames=5, semantic=True))
-    assert training.has_semantics
-    assert not validation.has_semantics
+    frames = read_frames(SHORT, TINY.image_size, record(tmp_path, n_frames=5, semantic=True))
+    assert frames.training.has_semantics
+    assert not frames.validation.has_semantics
 
 
 @pytest.mark.parametrize("config", [SHORT, HISTORY], ids=["one stage", "two stages"])

@@ -51,7 +51,7 @@ def load_encoder(path: Path) -> Encoder:
     state = {name.removeprefix(BACKBONE): value for name, value in tensors.items() if name.startswith(BACKBONE)}
     try:
         config = as_type(header["config"], dict[str, Any])
-        backbone = Backbone(config["width"], config["batch_norm"])
+        backbone = Backbone(config["width"], batch_norm=True)
         backbone.load_state_dict(state)
         size = int(config["image_height"]), int(config["image_width"])
         return Encoder(backbone, size, as_type(header["ranges"], tuple[float, ...]))

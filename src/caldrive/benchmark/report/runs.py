@@ -24,6 +24,7 @@ LARGE_ERRORS = {  # before an infraction, from which an affordance is named: sha
     "hazard_stop": 0.2, "red_light": 0.2, "speed_sign": 0.2, "vehicle_distance": 3.0, "relative_angle": 0.1,
     "center_distance": 0.3,
 }  # fmt: skip
+SENSES = {"blind": "blind to", "truth": "told"}  # options that take affordances, and what a driver with them is
 OPTIONS = {"--controller": "controller", "--time-limit": "time_limit", "--seed": "seed"}  # of a command, if not usual
 
 
@@ -67,7 +68,8 @@ class BenchmarkRun:
         words += ["--signs"] if about["cap"] is None else ["--cap", f"{about['cap']:g}"]
         for option, name in OPTIONS.items():
             words += [option, str(about[name])] if about[name] != getattr(usual, name) else []
-        words += [word for name in about.get("blind") or () for word in ("--blind", name)]
+        words += [word for option in SENSES for name in about.get(option) or () for word in (f"--{option}", name)]
+        words += ["--variant", about["variant"]] if about.get("variant") else []
         words += ["--model", about["model_file"]] if about.get("model_file") else []
         return shlex.join([*words, "--out", "DIR"])
 
@@ -112,16 +114,20 @@ def load_run(path: Path) -> BenchmarkRun:
     if len(whole) < len(results):
         lacking = next(result.trial.key for result in results if not _is_whole(result))
         problems.append(f"lines that lack figures and are left out: {len(results) - len(whole)}, such as {lacking}")
-    name = " ".join([short_name(folder.description["agent"]), *_blindness(folder.description)])
+    about = folder.description
+    name = " ".join([short_name(about["agent"]), *filter(None, [about.get("variant")]), *_senses(about)])
     return BenchmarkRun(
         name=name, folder=path, description=folder.description, results=whole, problems=tuple(problems)
     )  # fmt: skip
 
 
-def _blindness(description: dict[str, Any]) -> list[str]:
-    """What a driver did not see, in words."""
-    blind = [BY_NAME[name].title if name in BY_NAME else name for name in description.get("blind") or ()]
-    return ["blind to", " and ".join(blind)] if blind else []
+def _senses(description: dict[str, Any]) -> list[str]:
+    """What a driver did not see, and what it was told, in words."""
+    words = list[str]()
+    for option, said in SENSES.items():
+        titles = [BY_NAME[name].title if name in BY_NAME else name for name in description.get(option) or ()]
+        words += [said, " and ".join(titles)] if titles else []
+    return words
 
 
 def _is_whole(result: TrialResult) -> bool:

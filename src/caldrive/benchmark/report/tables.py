@@ -11,6 +11,7 @@ from caldrive.benchmark.metrics import (
     Cell,
     mean_comfort,
     mean_errors,
+    paired,
     succeeded,
 )
 from caldrive.benchmark.published import COMFORT, SYSTEMS, success
@@ -23,6 +24,7 @@ from caldrive.benchmark.report.infraction_tables import (
     touches_table,
 )
 from caldrive.benchmark.report.runs import BenchmarkRun, Table, cells_by_place, conditions
+from caldrive.benchmark.suites import TrialResult
 
 STATIC = "navigation"  # the task whose comfort the paper gives
 COMFORT_HEADS = {
@@ -36,8 +38,8 @@ COMFORT_HEADS = {
 def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
     """All tables of the report: the runs, their success, and of the others those that are not empty."""
     others = [
-        infractions_table(runs), touches_table(runs), red_lights_table(runs), speeding_table(runs), _comfort(runs),
-        _affordance_errors(runs), _failure_causes(runs),
+        _paired(runs), infractions_table(runs), touches_table(runs), red_lights_table(runs), speeding_table(runs),
+        _comfort(runs), _affordance_errors(runs), _failure_causes(runs),
     ]  # fmt: skip
     return [_runs(runs), _success(runs), *(table for table in [_problems(runs), *others] if table.rows)]
 
@@ -112,6 +114,28 @@ def _cell_texts(cell: Cell | None) -> tuple[str, str, str, str]:
     )
 
 
+def _paired(runs: Sequence[BenchmarkRun]) -> Table:
+    """The first run beside each of the others, on the episodes that both drove."""
+    rows = []
+    for other in runs[1:]:
+        for condition, task in dict.fromkeys(key[1:] for key in cells_by_place(runs)):
+            pair = paired(_in_cell(runs[0], condition, task), _in_cell(other, condition, task))
+            if pair.episodes:
+                counts = (pair.both, pair.first_alone, pair.second_alone, pair.neither)
+                rows.append((condition, task, other.name, *map(str, counts), f"{pair.p_value:.2g}"))
+    first = runs[0].name
+    text = (
+        f"Goals that {first} and another agent reached in time in the same episodes, and McNemar's exact test: how "
+        "likely a difference as large would be if both were as good."
+    )
+    head = ("condition", "task", "other", "both", f"{first} alone", "other alone", "neither", "p")
+    return Table(title="Paired comparison", text=text, head=head, rows=tuple(rows))
+
+
+def _in_cell(run: BenchmarkRun, condition: str, task: str) -> list[TrialResult]:
+    return of_tasks(run.of_condition(condition), task)
+
+
 def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for run in runs:
@@ -120,7 +144,8 @@ def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
             groups = {f"{STATIC}, all conditions": of_tasks(run.results, STATIC)} | groups
         for name, results in groups.items():
             rows.append((run.name, name, *_comfort_texts(mean_comfort(results))))
-    rows.append(("CAL (paper)", f"{STATIC}, all conditions", *_comfort_texts(COMFORT)))
+    for system, figures in COMFORT.items():
+        rows.append((f"{system} (paper)", f"{STATIC}, all conditions", *_comfort_texts(figures)))
     text = (
         "Median distance to the centre line and RMS jerk (supplement 3.2, over static navigation in all conditions), "
         "the change of acceleration from frame to frame, which has the scale of the paper's figures, and the share of "

@@ -6,13 +6,32 @@ decides what a seed gives.
 
 from __future__ import annotations
 
+from typing import Protocol
+
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Generator, Tensor
 
-from caldrive.perception.dataset.config import AugmentationConfig
-from caldrive.perception.images import interleaved_rows
+from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
+from caldrive.perception.dataset.recolour import recolour
+from caldrive.perception.images import interleaved_rows, to_float
 
 INVISIBLE_BLUR = 0.2  # pixels of deviation, up to which a blur changes nothing
+
+
+class Looks(Protocol):
+    """Settings of what happens to a training's images."""
+
+    @property
+    def augmentation(self) -> AugmentationConfig:
+        """Of whole images."""
+        ...
+
+    @property
+    def recolour(self) -> RecolourConfig:
+        """Of each class of things."""
+        ...
 
 
 def augment(
@@ -28,6 +47,19 @@ def augment(
     for change in (_light, _blur, _salt_and_pepper):
         images = change(images, groups, config, generator)
     return images
+
+
+def augmented(
+    images: NDArray[np.uint8], semantics: NDArray[np.uint8] | None, group: Tensor, generator: Generator, config: Looks
+) -> Tensor:
+    """A batch's images (N, H, W, 3) as (N, 3, H, W) in [0, 1], recoloured where there are semantic images (N, H, W),
+    and augmented. group (N,): as in `augment`."""
+    changed = to_float(images)
+    if config.recolour.enabled and semantics is not None:
+        changed = recolour(changed, semantics, group, generator, config.recolour)
+    if config.augmentation.enabled:
+        changed = augment(changed, generator, group, config.augmentation)
+    return changed
 
 
 def _uniform(n: int, limit: float, share: float, generator: Generator) -> Tensor:

@@ -79,19 +79,20 @@ def _quantized(x: Any, high: Any, signed: bool, levels: int) -> Any:
     return ops.fake_quantize(x, np.float32(low), np.float32(high), np.float32(low), np.float32(high), levels)
 
 
-def _convolution(x: Any, conv: nn.Module, high: float, signed: bool, bits: int) -> Any:
+def convolution(x: Any, conv: nn.Module, high: float, signed: bool, bits: int) -> Any:
     """A convolution in integers. high: the largest size of what enters; signed: whether that is also negative."""
     assert isinstance(conv, nn.Conv2d)
     weight = conv.weight.detach().float().numpy()
     highs = np.abs(weight).max(axis=(1, 2, 3), keepdims=True) * 2 ** (8 - bits)  # of 8 bits only the lower are used
     weight = _quantized(ops.constant(np.ascontiguousarray(weight)), np.maximum(highs, 1e-9), signed=True, levels=255)
     x = _quantized(x, np.float32(high), signed, levels=256)
-    x = ops.convolution(x, weight, strides=[1, 1], pads_begin=[1, 1], pads_end=[1, 1], dilations=[1, 1])
+    strides, pads = list(conv.stride), [int(pad) for pad in conv.padding]
+    x = ops.convolution(x, weight, strides, pads, pads, dilations=[1, 1])
     assert conv.bias is not None
     return ops.add(x, constant(conv.bias, 1, -1, 1, 1))
 
 
-def _backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
+def backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
     """The backbone's features (1, F) of an image (1, 3, H, W); its fake quantizations become integers when it is
     compiled."""
     x = image
@@ -101,7 +102,7 @@ def _backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bit
         for conv in stage:
             if conv is not stage[0]:
                 x = ops.relu(x)
-            x = _convolution(x, conv, ranges[number], signed=number == 0, bits=bits)
+            x = convolution(x, conv, ranges[number], signed=number == 0, bits=bits)
             number += 1
         x = ops.max_pool(x, strides=[2, 2], dilations=[1, 1], pads_begin=[0, 0], pads_end=[0, 0], kernel_shape=[2, 2])
         x = ops.relu(normalised(x.output(0), norm, 1, -1, 1, 1))
@@ -118,20 +119,21 @@ class Int8Backbone:
     def __init__(
         self, backbone: Backbone, ranges: Sequence[float], size: tuple[int, int], *, threads: int, bits: int = 8
     ) -> None:
-        _require_trained(backbone, ranges)
+        require_trained(backbone, ranges)
         image = ops.parameter([1, 3, *size], np.float32)
-        self._graph = Graph([_backbone_graph(image, backbone, ranges, bits)], image, threads)
+        self._graph = Graph([backbone_graph(image, backbone, ranges, bits)], image, threads)
 
     def __call__(self, images: Tensor) -> Tensor:
         """Normalised images (N, 3, H, W), which pass one at a time, to features (N, F)."""
         return torch.from_numpy(np.concatenate([self._graph(image)[0] for image in images.numpy()[:, None]]))
 
 
-def _require_trained(backbone: Backbone, ranges: Sequence[float]) -> None:
-    """Raises ValueError where the ranges are not this backbone's, or where they or its weights are not numbers."""
-    if len(ranges) != len(backbone.convolutions()):
-        raise ValueError(f"found {len(ranges)} ranges, wanted {len(backbone.convolutions())}: train the network again")
-    numbers = (torch.as_tensor(ranges), *backbone.state_dict().values())
+def require_trained(seeing: nn.Module, ranges: Sequence[float]) -> None:
+    """Raises ValueError where the ranges are not those of what sees, or where they or its weights are not numbers."""
+    wanted = sum(isinstance(module, nn.Conv2d) for module in seeing.modules())
+    if len(ranges) != wanted:
+        raise ValueError(f"found {len(ranges)} ranges, wanted {wanted}: train the network again")
+    numbers = (torch.as_tensor(ranges), *seeing.state_dict().values())
     if not all(bool(tensor.isfinite().all()) for tensor in numbers):
         raise ValueError("found weights that are not numbers, wanted a trained network: train it again")
 
@@ -145,12 +147,22 @@ def _check_graph(x: Any, check: CameraCheck) -> Any:
         x = ops.convolution(x, constant(conv.weight), strides, pads, pads, dilations=[1, 1])
         x = ops.relu(normalised(x, norm, 1, -1, 1, 1))
     x = ops.reshape(x, ops.constant([1, -1]), False)
-    return _linear(ops.relu(_linear(x, check.head[0])), check.head[-1])
+    return linear(ops.relu(linear(x, check.head[0])), check.head[-1])
 
 
-def _linear(x: Any, layer: nn.Module) -> Any:
+def linear(x: Any, layer: nn.Module) -> Any:
+    """A linear layer in 32 bits."""
     assert isinstance(layer, nn.Linear)
     return ops.add(ops.matmul(x, constant(layer.weight), False, True), constant(layer.bias, 1, -1))
+
+
+def image_graph(size: tuple[int, int], gain: Sequence[float], shift: Sequence[float]) -> tuple[Any, Any]:
+    """The parameter for an image (1, H, W, 3) in bytes, and (1, 3, H, W): each byte times the gain of its channel plus
+    its shift."""
+    image = ops.parameter([1, *size, 3], np.uint8)
+    gains, shifts = (ops.constant(np.array(values, np.float32)) for values in (gain, shift))
+    x = ops.add(ops.multiply(ops.convert(image, "f32"), gains), shifts)
+    return image, ops.transpose(x, ops.constant([0, 3, 1, 2]))
 
 
 class OpenVINOEyes:
@@ -160,12 +172,9 @@ class OpenVINOEyes:
     def __init__(
         self, network: Network, ranges: Sequence[float], check: CameraCheck | None, *, threads: int, bits: int
     ) -> None:
-        _require_trained(network.backbone, ranges)
-        image = ops.parameter([1, *network.config.image_size, 3], np.uint8)
-        gain, shift = (np.array(values, np.float32) for values in gain_and_shift())
-        x = ops.add(ops.multiply(ops.convert(image, "f32"), ops.constant(gain)), ops.constant(shift))
-        x = ops.transpose(x, ops.constant([0, 3, 1, 2]))
-        outputs = [_backbone_graph(x, network.backbone, ranges, bits)]
+        require_trained(network.backbone, ranges)
+        image, x = image_graph(network.config.image_size, *gain_and_shift())
+        outputs = [backbone_graph(x, network.backbone, ranges, bits)]
         if check is not None:
             outputs.append(_check_graph(x, check))
         self._graph = Graph(outputs, image, threads)

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor, nn
 
-from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.network import Network
 
 IMAGES_A_PASS = 16
@@ -42,8 +41,9 @@ def _with_prior(network: Network, counts: Counts, sign: float) -> Network:
 
 
 @torch.no_grad()
-def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
-    """For each convolution the largest size of what enters it as normalised images (N, 3, H, W) pass.
+def input_ranges(seeing: nn.Module, images: Tensor) -> tuple[float, ...]:
+    """For each convolution of what sees, in their order, the largest size of what enters it as images (N, 3, H, W)
+    pass, normalised as it takes them.
 
     Nothing is clipped, though that would make the steps of 8 bits finer: the few largest values are lamps and signs.
     """
@@ -52,11 +52,12 @@ def input_ranges(backbone: Backbone, images: Tensor) -> tuple[float, ...]:
     def note(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
         sizes[-1].append(float(inputs[0].abs().max()))
 
-    hooks = [conv.register_forward_pre_hook(note) for conv in backbone.convolutions()]
+    convolutions = [module for module in seeing.modules() if isinstance(module, nn.Conv2d)]
+    hooks = [conv.register_forward_pre_hook(note) for conv in convolutions]
     try:
         for part in torch.split(images, IMAGES_A_PASS):
             sizes.append([])
-            backbone(part)
+            seeing(part)
     finally:
         for hook in hooks:
             hook.remove()

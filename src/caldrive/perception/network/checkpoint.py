@@ -95,8 +95,8 @@ def read_header(path: Path) -> dict[str, Any]:
 
 
 def require_kind(path: Path, header: Mapping[str, Any], wanted: str) -> None:
-    """Raises CheckpointError where a file's tensors are not of this kind (a key of `AGENTS`), but part of a training, or
-    the weights of another agent."""
+    """Raises CheckpointError where a file's tensors are not of this kind (a key of `AGENTS`), but another agent's, or
+    part of a training."""
     found = header.get("kind")
     if found == wanted:
         return

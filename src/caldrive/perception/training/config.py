@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, Literal
 
 from tyro.conf import arg
 
@@ -36,22 +36,15 @@ class LossWeights:
         require_limits(vars(self), dict.fromkeys(vars(self), (0.0, math.inf)), vars(type(self)), "loss-weights")
 
 
-HISTORY_SHARE = 3 / 14  # of the steps, in which the temporal blocks learn alone
-
 # What each number may be, from and to; a setting that is not here may be any number.
-LIMITS: Limits = {
+LOOP_LIMITS: Limits = {
     "steps": (1, 10_000_000),
     "batch": (1, 100_000),
-    "window": (1, 1000),
     "learning_rate": (1e-9, 1.0),
     "warm_up": (0, 10_000_000),
     "final_rate": (0.0, 1.0),
     "clip": (1e-9, 1e9),
     "balance": (0.0, 1.0),
-    "alternative_share": (0.0, 1.0),
-    "history_batch": (1, 100_000),
-    "camera_check_steps": (0, 10_000_000),
-    "backbone_chunk": (0, 1_000_000),
     "cache_gb": (0.0, math.inf),
     "validation_share": (0.0, 1.0),
     "evaluate_every": (1, 10_000_000),
@@ -61,45 +54,29 @@ LIMITS: Limits = {
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
-    """How the network learns: Adam with a warm-up and a cosine, then a second stage for the temporal blocks alone."""
+class LoopConfig:
+    """What every training has: Adam with a warm-up and a cosine, on the images of a recording."""
 
     steps: int = 14_000
-    """Steps in all: of the whole network, and then of its temporal blocks alone."""
+    """Steps in all."""
     batch: int = 64
     """Windows a step."""
-    window: int = 1
-    """Consecutive frames of a window that give a loss."""
     learning_rate: Annotated[float, arg(aliases=("--rate",))] = 1e-3
     """Base learning rate."""
+    betas: tuple[float, float] = (0.9, 0.999)
+    """Adam's: how much of the old mean gradient, and of its square, stays in each step."""
     warm_up: int = 100
     """Steps in which the rate rises to the base rate."""
     final_rate: float = 0.02
     """Share of the base rate that is left at the end of the cosine."""
     clip: float = 5.0
     """Largest norm of the gradient."""
-    loss_weights: LossWeights = LossWeights(relative_angle=5.0)
-    """What the parts of the loss count while the backbone learns."""
     balance: float = 0.5
-    """0 draws windows evenly, 1 in inverse proportion to the frequency of the rarest label in them."""
-    alternative_share: float = 0.5
-    """Share of the windows that are seen under another command, with its labels, where one could be given."""
+    """0 draws windows evenly, 1 in inverse proportion to the frequency of what is rarest in them."""
     augmentation: AugmentationConfig = AugmentationConfig()
     """Other colours, light, blur and noise for whole images."""
     recolour: RecolourConfig = RecolourConfig()
     """Other colours for each class of things, where the recording has semantic images."""
-    history_steps: int | None = None
-    """Of all steps the last ones, in which the temporal blocks learn alone from what the finished backbone makes of the
-    frames; without it three of fourteen. Until then a window is seen as if its stream began there. 0: they see their
-    history from the first step."""
-    history_batch: int = 256
-    """Windows with their history in a step of the second stage."""
-    camera_check_steps: int = 5_000
-    """Steps of the third stage, in which the camera check learns what a working camera's images look like; no more than
-    --steps. 0 leaves it out."""
-    backbone_chunk: int = 0
-    """Images that pass the backbone together, with gradient checkpointing, where a batch finds no room in memory; 0 for
-    all of them. Only without batch norm, which looks at a whole batch."""
     validation_share: float = 0.05
     """Share of the episodes that is kept for validation."""
     evaluate_every: int = 2000
@@ -112,19 +89,75 @@ class TrainingConfig:
     """Precision of the arithmetic; auto takes bf16 where that is faster."""
     device: str = "auto"
     """cpu, cuda, or auto for a GPU where there is one; torchrun trains on several."""
+    seed: int = 0
+    """Decides everything random."""
+
+    def __post_init__(self) -> None:
+        require_limits(vars(self), LOOP_LIMITS, usual(self))
+        for beta in self.betas:
+            require_within("--betas", beta, 0.0, 1 - 1e-9, 0.9)
+
+    @property
+    def wants_semantics(self) -> bool:
+        """Whether it looks at semantic images, where the recording has them."""
+        return self.recolour.enabled
+
+
+def usual(config: LoopConfig) -> dict[str, Any]:
+    """The defaults of settings by their names."""
+    return {field.name: field.default for field in fields(config)}
+
+
+HISTORY_SHARE = 3 / 14  # of the steps, in which the temporal blocks learn alone
+
+LIMITS: Limits = {
+    "window": (1, 1000),
+    "alternative_share": (0.0, 1.0),
+    "history_batch": (1, 100_000),
+    "camera_check_steps": (0, 10_000_000),
+    "backbone_chunk": (0, 1_000_000),
+}
+
+
+@dataclass(frozen=True)
+class TrainingConfig(LoopConfig):
+    """How CAL's network learns: as a whole, then its temporal blocks alone, then its camera check."""
+
+    window: int = 1
+    """Consecutive frames of a window that give a loss."""
+    loss_weights: LossWeights = LossWeights(relative_angle=5.0)
+    """What the parts of the loss count while the backbone learns."""
+    alternative_share: float = 0.5
+    """Share of the windows that are seen under another command, with its labels, where one could be given."""
+    history_steps: int | None = None
+    """Of all steps the last ones, in which the temporal blocks learn alone from what the finished backbone makes of the
+    frames; without it three of fourteen. Until then a window is seen as if its stream began there. 0: they see their
+    history from the first step."""
+    history_batch: int = 256
+    """Windows with their history in a step of the second stage."""
+    camera_check_steps: int = 5_000
+    """Steps of the third stage, in which the camera check learns what a working camera's images look like; no more than
+    --steps. 0 leaves it out."""
+    backbone_chunk: int = 0
+    """Images that pass the backbone together, with gradient checkpointing, where a batch finds no room in memory; 0 for
+    all of them. Only without batch norm, which looks at a whole batch."""
     initial: str | None = None
     """A trained network (.safetensors) to begin with, instead of a new one; its blocks where they are built alike."""
     imagenet: str = "none"
     """VGG16's ImageNet weights for a backbone of full width to begin with: a file (.safetensors or .pth), cache for
     those in torch.hub's cache, or none."""
-    seed: int = 0
-    """Decides everything random."""
 
     def __post_init__(self) -> None:
-        require_limits(vars(self), LIMITS, vars(TrainingConfig))
+        super().__post_init__()
+        require_limits(vars(self), LIMITS, usual(self))
         require_within("--history-steps", self.second_stage, 0, self.steps - 1, 0)
         if self.initial and self.imagenet not in ("none", "cache"):
             raise ValueError("found --initial and --imagenet, wanted one network to begin with: type one of them")
+
+    @property
+    def wants_semantics(self) -> bool:
+        """Whether it looks at semantic images, where the recording has them."""
+        return super().wants_semantics or self.loss_weights.segmentation > 0
 
     @property
     def second_stage(self) -> int:

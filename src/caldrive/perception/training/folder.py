@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from caldrive.affordances import SPECS
 from caldrive.files import read_json, write_figure, write_whole
 from caldrive.perception.network.checkpoint import UNFINISHED, CheckpointError
 
@@ -89,6 +88,10 @@ class TrainingFolder:
         shutil.rmtree(self.features, ignore_errors=True)
         self.unfinished.unlink(missing_ok=True)
 
+    def draw_curves(self, figures: Sequence[str]) -> None:
+        """Draws the metrics anew. figures: names of those that a validation has."""
+        draw_curves(self.rows, figures, self.curves)
+
     def close(self) -> None:
         """Writes what TensorBoard has not been given yet."""
         if self._writer is not None:
@@ -102,20 +105,22 @@ def _row(line: bytes) -> Row:
     return row
 
 
-def draw_curves(rows: Sequence[Mapping[str, float]], path: Path) -> None:
+def draw_curves(rows: Sequence[Mapping[str, float]], figures: Sequence[str], path: Path) -> None:
     """Writes a PNG of a run's metrics, a row a step with `step`, `loss` and now and then `validation/<figure>`."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14, 6))
+    figure, columns = Figure(figsize=(14, 6)), (len(figures) + 2) // 2
     figure.subplots_adjust(0.06, 0.08, 0.99, 0.94, wspace=0.22, hspace=0.32)  # "constrained" would take twice as long
-    axes = figure.subplots(2, 4).ravel()
+    axes = figure.subplots(2, columns, squeeze=False).ravel()
     step, loss = (np.array([row[name] for row in rows]) for name in ("step", "loss"))
     width = min(SMOOTHED_STEPS, len(rows))
     axes[0].plot(step[width - 1 :], np.convolve(loss, np.full(width, 1 / width), "valid"), color="#3b6ea5")
     axes[0].set(title=f"training loss, mean of {width} steps", yscale="log")
-    for ax, name in zip(axes[1:], ["loss", *(spec.metric for spec in SPECS)], strict=True):
+    for ax, name in zip(axes[1:], figures, strict=False):
         validated = [row for row in rows if f"validation/{name}" in row]
         steps, values = ([row[key] for row in validated] for key in ("step", f"validation/{name}"))
         ax.plot(steps, values, "o-", color="#c8782d")
         ax.set(title=f"validation, {name.replace('_', ' ')}", xlabel="step")
+    for ax in axes[1 + len(figures) :]:
+        ax.remove()
     write_figure(path, figure)

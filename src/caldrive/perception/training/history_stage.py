@@ -19,6 +19,7 @@ from torch import Tensor, nn
 from torch.optim import Adam
 
 from caldrive.perception.dataset.frames import Frames, Ids
+from caldrive.perception.dataset.sampler import Sampler
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import BackboneEngine, backbone_engine
 from caldrive.perception.inference.precision import driving_precision
@@ -29,17 +30,21 @@ from caldrive.perception.network.checkpoint import (
     round_to_half,
     write_tensors,
 )
-from caldrive.perception.targets import multitask_loss
-from caldrive.perception.training.run import SEED_STRIDE, TrainingRun, gradient_step, learning_rate
+from caldrive.perception.network.network import Network
+from caldrive.perception.targets import ClassWeights, multitask_loss
+from caldrive.perception.training.config import TrainingConfig
+from caldrive.perception.training.run import SEED_STRIDE, gradient_step, learning_rate
 from caldrive.progress import Progress
 
 FRAMES_A_FILE, FRAMES_A_PASS = 8192, 64
 
 
-def feature_table(run: TrainingRun, ranges: tuple[float, ...], folder: Path, progress: Progress) -> Tensor:
+def feature_table(
+    network: Network, frames: Frames, ranges: tuple[float, ...], folder: Path, progress: Progress
+) -> Tensor:
     """The features of every frame (N, F) by the backbone, rounded as it is stored; kept in `folder`, so that it goes on
     after a kill. ranges: those that are stored with the network."""
-    network, frames = run.network.cpu().eval(), run.sampler.frames
+    network.cpu().eval()
     round_to_half(network)
     precision = driving_precision("auto", ranges)
     digest = _digest(network.backbone, precision, ranges, frames)
@@ -81,27 +86,31 @@ def _saved_features(path: Path, digest: str) -> Tensor | None:
     return tensors["features"] if header.get("digest") == digest else None
 
 
-def train_temporal_blocks(run: TrainingRun, features: Tensor) -> Iterator[float]:
-    """Trains the run's temporal blocks on features (N, F) of all its frames; yields each step's loss."""
-    config, steps = run.config, run.history_steps
-    weights = {name: weight.cpu() for name, weight in run.class_weights.items()}
-    blocks = nn.ModuleDict({name: block for name, block in run.network.task_blocks().items() if block.config.temporal})
-    optimizer = Adam(blocks.parameters(), config.learning_rate)
+def train_temporal_blocks(
+    network: Network, sampler: Sampler, class_weights: ClassWeights, config: TrainingConfig, features: Tensor
+) -> Iterator[float]:
+    """Trains a network's temporal blocks on features (N, F) of all frames; yields each step's loss."""
+    steps = config.second_stage
+    weights = {name: weight.cpu() for name, weight in class_weights.items()}
+    blocks = nn.ModuleDict({name: block for name, block in network.task_blocks().items() if block.config.temporal})
+    optimizer = Adam(blocks.parameters(), config.learning_rate, config.betas)
     blocks.train()
     for step in range(steps):
-        run_step = run.steps + step  # counted through both stages
+        run_step = config.steps - steps + step  # counted through both stages
         torch.manual_seed(config.seed * SEED_STRIDE + run_step)  # dropout
-        history, command, targets = _history_batch(run, features, run_step)
+        history, command, targets = _history_batch(sampler, network.span, config, features, run_step)
         outputs = {name: block(history, command) for name, block in blocks.items()}
         loss = multitask_loss(outputs, targets, weights)
         gradient_step(optimizer, loss, learning_rate(step, steps, config), config.clip)  # with a warm-up again
         yield float(loss.detach())
 
 
-def _history_batch(run: TrainingRun, features: Tensor, run_step: int) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
+def _history_batch(
+    sampler: Sampler, span: int, config: TrainingConfig, features: Tensor, run_step: int
+) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
     """The features (B, T, F), commands (B, S) and targets (B * S,) of a step."""
-    sampler, window, batch = run.sampler, run.config.window, run.config.history_batch
-    ids = sampler.frames.windows(sampler.draw(run_step, batch), window, run.network.span - 1)
-    alternatives = sampler.alternatives(run_step, batch, run.config.alternative_share)
+    window, batch = config.window, config.history_batch
+    ids = sampler.frames.windows(sampler.draw(run_step, batch), window, span - 1)
+    alternatives = sampler.alternatives(run_step, batch, config.alternative_share)
     command, targets = sampler.frames.commands_and_targets(ids[:, -window:], alternatives)
     return features[torch.from_numpy(ids)].float(), command, targets

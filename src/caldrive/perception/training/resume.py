@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypedDict
@@ -20,7 +22,7 @@ FREE = ("initial", "imagenet", "evaluate_every", "save_every", "cache_gb", "devi
 
 
 class Header(TypedDict):
-    """What a training's state says of itself. training, network: its settings; episodes: digest of the recording;
+    """What a training's state says of itself. training, network: its settings; episodes: digest of what it learns from;
     processes: how many share the work."""
 
     step: int
@@ -32,12 +34,12 @@ class Header(TypedDict):
 
 def save_state(path: Path, run: TrainingRun) -> None:
     """Write a run as it is between two steps."""
-    tensors = {f"{MODEL}{name}": value for name, value in run.model.state_dict().items()}
+    tensors = {f"{MODEL}{name}": value for name, value in run.learner.model.state_dict().items()}
     for number, moments in run.optimizer.state_dict()["state"].items():
         tensors |= {f"{OPTIMIZER}{number}.{name}": value for name, value in moments.items()}
     header: Header = {
-        "step": run.step, "network": asdict(run.network.config), "training": asdict(run.config),
-        "episodes": run.sampler.frames.digest, "processes": run.group.size,
+        "step": run.step, "network": dict(run.learner.network_settings), "training": asdict(run.config),
+        "episodes": run.learner.data_digest, "processes": run.group.size,
     }  # fmt: skip
     write_tensors(path, tensors, {"kind": KIND} | header)
 
@@ -52,8 +54,8 @@ def restore_state(path: Path, run: TrainingRun) -> None:
         header = as_type(values, Header)
         if difference := _difference(run, tensors, header):
             raise CheckpointError(f"found in {path} a run {difference}")
-        if not 0 <= header["step"] <= run.steps:
-            raise ValueError(f"step {header['step']} of {run.steps}")
+        if not 0 <= header["step"] <= run.learner.steps:
+            raise ValueError(f"step {header['step']} of {run.learner.steps}")
         _restore(run, tensors, header)
     except CheckpointError:
         raise
@@ -66,15 +68,15 @@ def restore_state(path: Path, run: TrainingRun) -> None:
 def _difference(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> str:
     """How the run of a state differs from this one, and what to type; nothing where it does not."""
     saved = _decisive(header["training"], header["network"])
-    for name, wanted in _decisive(asdict(run.config), asdict(run.network.config)).items():
+    for name, wanted in _decisive(_plain(asdict(run.config)), _plain(run.learner.network_settings)).items():
         if saved.get(name) != wanted:
             return f"with {name} {saved.get(name)}, wanted {wanted}: type the same settings, or another --out"
-    if _without_prefix(MODEL, tensors).keys() != run.model.state_dict().keys():
+    if _without_prefix(MODEL, tensors).keys() != run.learner.model.state_dict().keys():
         return (
             "with other tasks, wanted the same, with or without semantic images: type the --data that it began with, "
             "or another --out"
         )
-    if header["episodes"] != run.sampler.frames.digest:
+    if header["episodes"] != run.learner.data_digest:
         return "on other episodes, wanted the same: type the --data that it began with, or another --out"
     if header["processes"] != run.group.size:
         return f"of {header['processes']} processes, wanted {run.group.size}: start as many"
@@ -84,6 +86,12 @@ def _difference(run: TrainingRun, tensors: dict[str, Tensor], header: Header) ->
 def _decisive(training: dict[str, Any], network: dict[str, Any]) -> dict[str, Any]:
     """The settings on which a run's weights depend once it has begun, nested ones by names as on the command line."""
     return _flat({name: value for name, value in training.items() if name not in FREE} | {"network": network})
+
+
+def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as they come back from JSON, where a tuple is a list."""
+    plain: dict[str, Any] = json.loads(json.dumps(dict(settings)))
+    return plain
 
 
 def _flat(settings: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -100,9 +108,9 @@ def _without_prefix(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor
 
 
 def _restore(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> None:
-    run.model.load_state_dict(_without_prefix(MODEL, tensors))
-    saved = header["training"]
-    run.config = replace(run.config, initial=saved["initial"], imagenet=saved["imagenet"])
+    run.learner.model.load_state_dict(_without_prefix(MODEL, tensors))
+    began = {name: header["training"][name] for name in ("initial", "imagenet") if name in header["training"]}
+    run.learner.config = replace(run.learner.config, **began)  # with what it really began
     moments: dict[int, dict[str, Tensor]] = {}  # of each parameter
     for path, value in _without_prefix(OPTIMIZER, tensors).items():
         number, name = path.split(".")

@@ -1,4 +1,4 @@
-"""Blind drivers: an affordance is held at its default, and who needs it fails."""
+"""Drivers who are blind to an affordance, and fail where they need it, and those who are told the truth."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from caldrive.affordances import BY_NAME
-from caldrive.agents.blind import BlindPerception, blinded
 from caldrive.agents.cal import CALAgent, OraclePerception
+from caldrive.agents.senses import OtherSenses, with_senses
 from caldrive.control.controller import CALController, ControlConfig
-from caldrive.datatypes import Affordances, Command, Observation, Pose
+from caldrive.datatypes import Affordances, Command, Observation, Pose, Truth, VehicleState
 from caldrive.driving.rollout import run_episode
 from caldrive.results import InfractionKind
 from caldrive.scenarios import Scenario
@@ -37,7 +37,7 @@ class Seer:
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_what_is_not_seen_is_at_its_default_and_the_rest_is_as_it_was(name: str) -> None:
-    predicted = BlindPerception(Seer(), [name]).predict(ANYTHING)
+    predicted = OtherSenses(Seer(), [name]).predict(ANYTHING)
     assert getattr(predicted, name) == getattr(Affordances(), name)
     assert all(getattr(predicted, other) == getattr(SEEN, other) for other in BY_NAME if other != name)
 
@@ -47,13 +47,37 @@ def test_who_does_not_see_red_lights_runs_them(blind: tuple[str, ...], run: int)
     world = StraightRoad(light=60.0, green_at=30.0)
     agent = CALAgent(OraclePerception(world.truth), CALController(ControlConfig(cap=30.0), world.dt))
     scenario = Scenario("straight", 1, Pose(0, 0, 0), Pose(100, 0, 0), time_limit=40.0)
-    result = run_episode(world, blinded(agent, blind), scenario)
+    result = run_episode(world, with_senses(agent, blind), scenario)
     assert [i.kind for i in result.infractions] == [InfractionKind.RED_LIGHT] * run
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_what_is_told_is_true_and_the_rest_is_as_it_was_seen(name: str) -> None:
+    true = Affordances(0.0, 0.0, 90, 20.0, -0.1, -0.5)
+    truth = Truth(0.0, VehicleState(Pose(0, 0, 0)), true)
+    told = OtherSenses(Seer(), truth=[name], truth_source=lambda: truth).predict(ANYTHING)
+    assert getattr(told, name) == getattr(true, name)
+    assert all(getattr(told, other) == getattr(SEEN, other) for other in BY_NAME if other != name)
+    assert OtherSenses(Seer(), truth=list(BY_NAME), truth_source=lambda: truth).predict(ANYTHING) == true
+
+
+def test_a_driver_who_sees_nothing_but_is_told_of_red_lights_stops_for_them() -> None:
+    world = StraightRoad(light=60.0, green_at=30.0)
+    agent = CALAgent(OraclePerception(world.truth), CALController(ControlConfig(cap=30.0), world.dt))
+    others = [name for name in BY_NAME if name != "red_light"]
+    scenario = Scenario("straight", 1, Pose(0, 0, 0), Pose(100, 0, 0), time_limit=40.0)
+    result = run_episode(world, with_senses(agent, others, ["red_light"], world.truth), scenario)
+    assert not result.infractions
+
+
+def test_nobody_is_blind_to_what_he_is_told() -> None:
+    with pytest.raises(ValueError, match="found red_light in --blind and in --truth"):
+        with_senses(CALAgent(Seer(), CALController(ControlConfig(), 0.1)), ["red_light"], ["red_light"])
 
 
 def test_only_affordances_that_there_are_can_be_left_out() -> None:
     with pytest.raises(ValueError, match=r"found affordance 'lights', wanted one of hazard_stop, .*type --blind"):
-        blinded(CALAgent(Seer(), CALController(ControlConfig(), 0.1)), ["lights"])
+        with_senses(CALAgent(Seer(), CALController(ControlConfig(), 0.1)), ["lights"])
 
 
 def test_an_agent_without_a_perception_cannot_be_blind() -> None:
@@ -64,8 +88,8 @@ def test_an_agent_without_a_perception_cannot_be_blind() -> None:
         act: Any = None
 
     with pytest.raises(ValueError, match=r"found that Cruiser has no perception .*leave --blind out"):
-        blinded(Cruiser(), ["hazard_stop"])
-    assert blinded(cruiser := Cruiser(), []) is cruiser
+        with_senses(Cruiser(), ["hazard_stop"])
+    assert with_senses(cruiser := Cruiser(), []) is cruiser
 
 
 def test_the_command_line_takes_it_more_than_once(tmp_path: Path) -> None:

@@ -1,0 +1,100 @@
+"""What the imitation network learns from a recording: what the driver wanted, as from each camera's place.
+
+A camera beside the car's middle, or turned, sees what the car would see if it stood there. Its label is the steering
+that brings the car back: the clean control of the driver, never the disturbed one, with what his own law (`Stanley`,
+section 3.2, eq. 2) adds for the camera's offset and turn. The published correction is one for CARLA's wheels of 70
+degrees and cameras turned by 30 (coiltraine: 6 / pi * arctan(0.52 * 6 / v), at most 0.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caldrive.control.lateral import LateralConfig
+from caldrive.perception.dataset.frames import Frames, Ids
+from caldrive.perception.network.network import COMMANDS
+
+Numbers = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+LAW = LateralConfig()
+GAINS = np.array([getattr(LAW, command.value)[0] for command in COMMANDS])  # 1/s
+
+
+@dataclass(frozen=True)
+class DrivenFrames:
+    """Frames (N,) of somebody's driving: what an imitation learns from, wherever it was recorded."""
+
+    speed: Numbers
+    """(N,), m/s."""
+    command: Ids
+    """(N,), numbers of the network's commands."""
+    controls: Numbers
+    """(N, 3): steer, + to the left, throttle and brake, as from each camera's place."""
+    images: Callable[[Ids], Bytes]
+    """Images (n, H, W, 3) of frames by number."""
+    semantics: Callable[[Ids], Bytes | None]
+    """Their semantic images (n, H, W), where there are any."""
+    digest: str
+    """Tells these frames from others."""
+
+    def __len__(self) -> int:
+        return len(self.speed)
+
+
+def corrected_steer(steer: Numbers, left: Numbers, yaw: Numbers, speed: Numbers, gain: Numbers) -> Numbers:
+    """The steering (N,), in [-1, 1] and + to the left, for a car that stands at the camera's place.
+
+    steer: for the car where it is; left: of the camera, m; yaw: its turn to the left, rad; speed: m/s; gain: of the
+    driver's law, 1/s.
+    """
+    angle = -yaw - np.arctan(gain * left / np.maximum(speed, LAW.speed_floor))
+    return np.clip(steer + angle / LAW.max_angle, -1.0, 1.0)
+
+
+def driven_frames(frames: Frames) -> DrivenFrames:
+    """What an imitation learns from a recording's frames."""
+    speed, command = frames.column("speed"), frames.command
+    clean = [frames.column(f"clean_{name}") for name in ("steer", "throttle", "brake")]
+    left, yaw = frames.column("camera_left"), frames.column("camera_yaw")
+    steer = corrected_steer(clean[0], left, yaw, speed, GAINS[command])
+    controls = np.stack([steer, *clean[1:]], axis=1)
+    return DrivenFrames(speed, command, controls, frames.images, frames.semantics, frames.digest)
+
+
+# Edges of the classes in which the size of the steering is balanced, where it is.
+STEER_EDGES = (0.05, 0.15, 0.4)
+
+
+class CommandSampler:
+    """Draws frames: of each batch every command has the same share (CARLA paper, S.2.2). What step k draws depends on
+    (seed, k) only.
+
+    balance: 0 draws a command's frames evenly, 1 in inverse proportion to the frequency of their steering. Raises
+    ValueError where a command never occurs.
+    """
+
+    def __init__(self, frames: DrivenFrames, balance: float, seed: int) -> None:
+        self.seed, self._ids, self._cumulative = seed, list[Ids](), list[Numbers]()
+        steer = np.digitize(np.abs(frames.controls[:, 0]), STEER_EDGES)
+        for number, command in enumerate(COMMANDS):
+            ids = np.flatnonzero(frames.command == number)
+            if not len(ids):
+                raise ValueError(
+                    f"found no frame with the command {command.value}, wanted some of each: record more episodes"
+                )
+            weight = (1 / np.bincount(steer[ids])[steer[ids]]) ** balance
+            self._ids.append(ids)
+            self._cumulative.append(np.cumsum(weight))
+
+    def draw(self, step: int, n: int) -> Ids:
+        """n frames; where n is no multiple of the commands, the first of them have one more."""
+        chances = np.random.default_rng((self.seed, step)).random(n)
+        drawn = np.empty(n, np.int64)
+        for number, (ids, cumulative) in enumerate(zip(self._ids, self._cumulative, strict=True)):
+            mine = slice(number, None, len(COMMANDS))
+            drawn[mine] = ids[np.searchsorted(cumulative, chances[mine] * cumulative[-1], side="right")]
+        return drawn

@@ -1,0 +1,189 @@
+"""The training of conditional imitation learning: squared errors of what the driver did, on one command's branch."""
+
+from __future__ import annotations
+
+import copy
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Generator, Tensor, nn
+
+from caldrive.agents.conditional_imitation.augmentation import augment_as_published
+from caldrive.agents.conditional_imitation.checkpoint import ImitationInfo, round_to_bytes, save_imitation
+from caldrive.agents.conditional_imitation.config import ImitationConfig, ImitationNetworkConfig, ImitationWeights
+from caldrive.agents.conditional_imitation.labels import CommandSampler, DrivenFrames, driven_frames
+from caldrive.agents.conditional_imitation.network import OUTPUTS, SPEED_SCALE, ImitationNetwork
+from caldrive.perception.dataset.augmentation import augmented
+from caldrive.perception.dataset.frames import Ids
+from caldrive.perception.images import to_float
+from caldrive.perception.inference.engines import autocast
+from caldrive.perception.network.calibration import input_ranges
+from caldrive.perception.network.network import COMMANDS
+from caldrive.perception.training.distributed import join_process_group
+from caldrive.perception.training.folder import TrainingFolder
+from caldrive.perception.training.loop import Stop, never, read_frames, run_training
+from caldrive.progress import Progress, silent
+from caldrive.recordings.folder import episode_paths
+
+FRAMES_A_PASS = 64
+RANGE_FRAMES = 512  # on which the ranges of 8 bits are found
+
+
+def train_imitation(
+    config: ImitationConfig,
+    data: Path,
+    out: Path,
+    network: ImitationNetworkConfig,
+    progress: Progress = silent,
+    stop: Stop = never,
+) -> Path:
+    """Train a network on the episodes in `data`, and return the finished one's path, `out`/model.safetensors.
+
+    `loop.run_training` says what lies in `out`. Raises ValueError for settings or data that cannot be, and where
+    another process works in `out`.
+    """
+    group = join_process_group(config.device, config.batch)
+    episode_paths(data)  # without one, no folder is made
+
+    def make_learner() -> ImitationLearner:
+        frames = read_frames(config, network.image_size, data)
+        keys = sorted({episode.key for episode in frames.validation.episodes})
+        training, validation = (driven_frames(part) for part in (frames.training, frames.validation))
+        return start(config, network, training, validation, keys, group.device)
+
+    return run_training(make_learner, out, group, progress, stop)
+
+
+def imitation_loss(
+    outputs: tuple[Tensor, Tensor], controls: Tensor, speed: Tensor, weights: ImitationWeights
+) -> Tensor:
+    """The weighted sum of the mean squared errors. outputs: of the network; controls (N, 3), as named by `OUTPUTS`;
+    speed (N,), m/s, which counts as a share of 25 m/s."""
+    predicted, predicted_speed = (output.float() for output in outputs)
+    errors = (predicted - controls).square().mean(dim=0)
+    parts = [getattr(weights, name) * error for name, error in zip(OUTPUTS, errors, strict=True)]
+    speed_error = ((predicted_speed - speed) / SPEED_SCALE).square().mean()
+    return torch.stack([*parts, weights.speed * speed_error]).sum()
+
+
+@dataclass
+class ImitationLearner:
+    """The network of conditional imitation learning (`run.Learner`)."""
+
+    config: ImitationConfig
+    model: ImitationNetwork
+    training: DrivenFrames
+    validation: DrivenFrames
+    validation_keys: list[str]
+    sampler: CommandSampler
+    device: str
+    figures: tuple[str, ...] = ("loss", *(f"{name}/mae" for name in (*OUTPUTS, "speed")))
+
+    @property
+    def steps(self) -> int:
+        """All of them: there is no second stage."""
+        return self.config.steps
+
+    @property
+    def network_settings(self) -> dict[str, Any]:
+        """What the network is built from."""
+        return asdict(self.model.config)
+
+    @property
+    def data_digest(self) -> str:
+        """Tells the frames that it learns from from others."""
+        return self.training.digest
+
+    def loss(self, step: int, share: slice, forward: nn.Module, generator: Generator) -> Tensor:
+        """The loss of a step's frames."""
+        ids = self.sampler.draw(step, self.config.batch)[share]
+        images = self._images(ids, generator).to(self.device)
+        speed, command, controls = self._targets(self.training, ids)
+        with autocast(self.config.precision, self.device):
+            outputs = forward(images, speed, command)
+        return imitation_loss(outputs, controls, speed, self.config.weights)
+
+    def _images(self, ids: Ids, generator: Generator) -> Tensor:
+        """A batch's images (N, 3, H, W) in [0, 1], augmented."""
+        images = self.training.images(ids)
+        if self.config.published_augmentation:
+            return augment_as_published(to_float(images), generator)
+        semantics = self.training.semantics(ids) if self.config.recolour.enabled else None
+        return augmented(images, semantics, torch.arange(len(ids)), generator, self.config)
+
+    def _targets(self, frames: DrivenFrames, ids: Ids) -> tuple[Tensor, Tensor, Tensor]:
+        """Speeds (N,), commands (N,) and controls (N, 3) of frames by number."""
+        values = (frames.speed[ids].astype(np.float32), frames.command[ids], frames.controls[ids].astype(np.float32))
+        speed, command, controls = (torch.from_numpy(value).to(self.device) for value in values)
+        return speed, command, controls
+
+    def validate(self, path: Path) -> dict[str, float]:
+        """Writes the network as it is, with its validation's figures, and returns them."""
+        network = copy.deepcopy(self.model).eval()
+        round_to_bytes(network)
+        metrics = self._measure(network)
+        data = {
+            "train_frames": len(self.training), "validation_frames": len(self.validation),
+            "validation_episodes": self.validation_keys,
+        }  # fmt: skip
+        info = ImitationInfo(network.config, data, metrics, asdict(self.config), self._ranges(network))
+        save_imitation(path, network, info)
+        return metrics
+
+    @torch.inference_mode()
+    def _ranges(self, network: ImitationNetwork) -> tuple[float, ...]:
+        """The ranges that driving in integers needs."""
+        ids = np.unique(self.sampler.draw(0, RANGE_FRAMES))  # of a small recording the same ones come again and again
+        images = to_float(self.training.images(ids)).to(self.device)
+        return input_ranges(network.trunk, network.normalised(images))
+
+    @torch.inference_mode()
+    def _measure(self, network: ImitationNetwork) -> dict[str, float]:
+        """Mean errors on the frames kept for validation: all together, and of the steering for each command."""
+        frames = self.validation
+        parts = np.array_split(np.arange(len(frames)), max(1, len(frames) // FRAMES_A_PASS))
+        outputs = [self._outputs(network, frames, ids) for ids in parts]
+        controls, speed = (torch.cat(part) for part in zip(*outputs, strict=True))
+        wanted_speed, command, wanted = self._targets(frames, np.arange(len(frames)))
+        errors = (controls - wanted).abs()
+        figures = {f"{name}/mae": float(errors[:, k].mean()) for k, name in enumerate(OUTPUTS)}
+        figures["speed/mae"] = float((speed - wanted_speed).abs().mean())
+        for number, one in enumerate(COMMANDS):
+            if bool((command == number).any()):
+                figures[f"steer/mae/{one.value}"] = float(errors[command == number, 0].mean())
+        figures["loss"] = float(imitation_loss((controls, speed), wanted, wanted_speed, self.config.weights))
+        return figures
+
+    def _outputs(self, network: ImitationNetwork, frames: DrivenFrames, ids: Ids) -> tuple[Tensor, Tensor]:
+        """What a network makes of frames by number."""
+        speed, command, _ = self._targets(frames, ids)
+        with autocast(self.config.precision, self.device):
+            controls, seen_speed = network(to_float(frames.images(ids)).to(self.device), speed, command)
+        return controls.float(), seen_speed.float()
+
+    def finish(self, folder: TrainingFolder, progress: Progress) -> None:
+        """The network as it is becomes the finished one."""
+        if not folder.has_finished(self.steps):
+            if not folder.unfinished.is_file():
+                self.validate(folder.unfinished)
+            os.replace(folder.unfinished, folder.model)
+        folder.remove_unfinished()
+
+
+def start(
+    config: ImitationConfig,
+    network: ImitationNetworkConfig,
+    training: DrivenFrames,
+    validation: DrivenFrames,
+    validation_keys: list[str],
+    device: str,
+) -> ImitationLearner:
+    """What learns, before its first step."""
+    torch.manual_seed(config.seed)
+    model = ImitationNetwork(network).to(device)
+    sampler = CommandSampler(training, config.balance, config.seed)
+    return ImitationLearner(config, model, training, validation, validation_keys, sampler, device)
