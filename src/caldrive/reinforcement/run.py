@@ -6,7 +6,8 @@ episodes: a run that is killed anywhere resumes to the same weights.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
@@ -56,7 +57,8 @@ class LearningRun:
         self.config, self.policy, self.update = config, policy, 0
         self.curriculum = Curriculum(config.tasks, config.advance_at, config.window)
         makers = [make_env] * config.environments
-        several = SubprocVecEnv(makers, start_method="forkserver") if config.processes else DummyVecEnv(makers)
+        with _living_processes():
+            several = SubprocVecEnv(makers, start_method="forkserver") if config.processes else DummyVecEnv(makers)
         self.env = VecNormalize(several, norm_obs=False, gamma=config.discount)
         kind: Any = LearningPolicy  # which has all that PPO asks of a policy
         self.model = PPO(
@@ -96,13 +98,8 @@ class LearningRun:
             self._begin_episodes()
         set_random_seed(derived_seed(self.config.seed, self.update, "actions"))
         notes = _Notes(self.env)
-        try:
+        with _living_processes():
             self.model.learn(self.config.update_steps, notes, log_interval=LATER, reset_num_timesteps=False)
-        except (EOFError, ConnectionError) as error:
-            raise RuntimeError(
-                "found that the process of an environment has died, wanted all of them: see above what it said, and "
-                "type the same again to go on"
-            ) from error
         self.update += 1
         for ended in notes.ended:
             if self.curriculum.note(ended.task, ended.success):
@@ -112,7 +109,13 @@ class LearningRun:
 
     def close(self) -> None:
         """Ends the environments and their processes."""
-        self.env.close()
+        several: Any = self.env.venv
+        if not getattr(several, "waiting", False):
+            self.env.close()
+            return
+        for process in several.processes:  # one has died, or was interrupted: to wait for its answer may take for ever
+            process.terminate()
+            process.join()
 
     def _begin_episodes(self) -> None:
         """New episodes in all environments, from seeds that follow from the update."""
@@ -133,6 +136,18 @@ class LearningRun:
         for task in dict.fromkeys(ended.task for ended in notes.ended):
             figures[f"success/{task}"] = fmean(ended.success for ended in notes.ended if ended.task == task)
         return figures
+
+
+@contextmanager
+def _living_processes() -> Iterator[None]:
+    """Raises RuntimeError where an environment's process dies meanwhile."""
+    try:
+        yield
+    except (EOFError, ConnectionError) as error:
+        raise RuntimeError(
+            "found that the process of an environment has died, wanted all of them: see above what it said, and type "
+            "the same again to go on"
+        ) from error
 
 
 class _Notes(BaseCallback):

@@ -17,12 +17,11 @@ from caldrive.files import locked_folder, write_figure
 from caldrive.perception.training.folder import TrainingFolder
 from caldrive.progress import Progress, silent
 from caldrive.reinforcement.config import ReinforcementConfig
-from caldrive.reinforcement.environment import LearningEnv, env_config, make_learning_env, policy_config
+from caldrive.reinforcement.environment import env_config, make_learning_env, policy_config
 from caldrive.reinforcement.run import LearningRun
 from caldrive.reinforcement.state import digests, plain_settings, restore_state, save_state
 
 SMOOTHED_UPDATES = 20  # that curves are averaged over
-MakeEnv = Callable[[ReinforcementConfig, Encoder | None], LearningEnv]
 
 
 def train_rl(
@@ -30,7 +29,6 @@ def train_rl(
     out: Path | str,
     progress: Progress = silent,
     stop: Callable[[int], bool] = lambda update: False,
-    make_env: MakeEnv = make_learning_env,
 ) -> Path:
     """Train a policy by reinforcement, and return the finished one's path, `out`/model.safetensors.
 
@@ -43,7 +41,7 @@ def train_rl(
     env_config(config, encoder)
     folder = TrainingFolder(Path(out))
     with locked_folder(Path(out)):
-        run = LearningRun(config, policy_config(config, encoder), partial(make_env, config, encoder))
+        run = LearningRun(config, policy_config(config, encoder), partial(make_learning_env, config, encoder))
         with closing(run), closing(folder):
             if folder.has_state:
                 restore_state(folder.state, run)
