@@ -53,8 +53,9 @@ def drive_table(report: DriveReport) -> Group:
     reached = sum(result.outcome is Outcome.SUCCESS for result in report.results)
     infractions = sum(len(result.infractions) for result in report.results)
     summary = f"{reached} of {len(report.results)} reached the goal in time; infractions: {infractions or 'none'}"
-    video = [Text(f"video: {report.video}")] if report.video else []
-    return Group(table, Text(summary), *video, Text(f"episodes: {report.files[0].parent}"))
+    made = {"video": report.video, "recording": report.recording}
+    lines = [Text(f"{name}: {path}") for name, path in made.items() if path]
+    return Group(table, Text(summary), *lines, Text(f"episodes: {report.files[0].parent}"))
 
 
 def world_table(speed: WorldTiming, ratios: Mapping[str, float]) -> Group:
