@@ -11,8 +11,8 @@ import pytest
 import torch
 from PIL import Image as Picture
 
-from caldrive.datatypes import Command
-from caldrive.explain.attention_video import PANEL_WIDTH, Scene, look, panels
+from caldrive.datatypes import Command, Observation
+from caldrive.explain.attention_video import PANEL_WIDTH, LiveAttention, Scene, look, panels
 from caldrive.explain.gradcam import Question
 from caldrive.perception.network.network import Network
 from tests.command_line import run_json
@@ -57,6 +57,29 @@ def test_pictures_of_ones_own_are_filmed(tmp_path: Path) -> None:
         "explain", "pictures", str(folder), "--crop", "10:80", "--affordance", "red_light", "--out", str(out)
     )
     assert answer["frames"] == 2
+
+
+def test_attention_is_drawn_while_a_car_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    torch.manual_seed(1)
+    network = Network(CONFIG).eval()
+    monkeypatch.setattr("caldrive.explain.attention_video.load_network", lambda path: (network, None))
+    live, images = LiveAttention("relative_angle"), pictures(2)
+
+    def at(time: float, image: np.ndarray, command: Command = Command.LEFT) -> Observation:
+        return Observation(time, image, 5.0, command)
+
+    left = live(at(0.0, images[0]))
+    assert left is not None
+    assert left.shape[1] == PANEL_WIDTH
+    assert live(at(0.1, images[1][:40])) is None
+    right = LiveAttention("relative_angle")(at(0.0, images[0], Command.RIGHT))
+    assert right is not None
+    assert (left != right).any()
+
+
+def test_a_drive_that_nobody_records_draws_no_attention() -> None:
+    refused = run_json("drive", "--agent", "oracle", "--attention", "red_light", "--no-video", code=2)
+    assert "found --attention red_light in a drive that is not recorded" in refused["error"]
 
 
 @pytest.mark.parametrize(

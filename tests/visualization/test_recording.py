@@ -179,7 +179,7 @@ def test_the_town_the_route_and_the_others_stand_where_they_are(
 
 def test_the_picture_is_the_agents_image_and_attention_stands_beside_it(tmp_path: Path) -> None:
     seen = [None, np.full((6, 8, 3), 200, np.uint8)]
-    read = record(tmp_path / "a.mcap", [step(0.0), step(0.1)], attention=lambda image: seen.pop(0))
+    read = record(tmp_path / "a.mcap", [step(0.0), step(0.1)], attention=lambda observation: seen.pop(0))
     image, attention = read.messages["/camera"][0], read.messages["/attention"]
     assert (image.format, image.frame_id) == ("jpeg", "camera")
     assert np.abs(simplejpeg.decode_jpeg(image.data, colorspace="RGB").astype(int) - IMAGE).mean() < 3

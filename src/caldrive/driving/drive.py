@@ -60,8 +60,8 @@ def drive(settings: DriveSettings, progress: Progress = silent, attention: Atten
     """Drive settings.episodes episodes; writes episode-000.json, 001, ... to settings.out, and with the
     video drive.mp4 also a plot of each episode's speed.
 
-    attention: for recordings, where the agent looked in an image, as a picture. Raises ValueError, FileNotFoundError,
-    OSError or RuntimeError with what to type where it cannot be done.
+    attention: for recordings, a picture of where the agent looked in an observation. Raises ValueError,
+    FileNotFoundError, OSError or RuntimeError with what to type where it cannot be done.
     """
     _require_places(settings)
     scenarios = chosen_scenarios(settings, settings.episodes)

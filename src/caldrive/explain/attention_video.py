@@ -1,11 +1,12 @@
-"""A video of where the network looks: of a drive, or of a person's own pictures."""
+"""Where the network looks as moving pictures: a video of a drive or of a person's own pictures, and while a car
+drives."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from PIL import Image as Picture
 
 from caldrive.agents.rows import model_path
 from caldrive.checks import require_within, require_writable_file
-from caldrive.datatypes import Command, Image
+from caldrive.datatypes import Command, Image, Observation
 from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.pictures import open_source
 from caldrive.driving.referee import Referee
@@ -144,3 +145,27 @@ def panels(looked: Looked, scales: Sequence[float]) -> Image:
     rows = [np.concatenate(drawn[k : k + columns], axis=1) for k in range(0, len(drawn), columns)]
     frame = np.concatenate(rows)
     return frame[: frame.shape[0] // 2 * 2]
+
+
+class LiveAttention:
+    """Draws the attention to one affordance while a car drives, for recordings. Its scale is the largest so far: what
+    comes is not known yet. model: the network, None for the one in the package."""
+
+    def __init__(self, affordance: str, model: Path | None = None, layer: str = "coarse") -> None:
+        self.question, self.layer = Question(affordance), layer
+        self.network, _ = load_network(model_path(model))
+        self._history: deque[Image] = deque(maxlen=self.network.span)
+        self._scale, self._time = 0.0, 0.0
+
+    def __call__(self, observation: Observation) -> Image | None:
+        """The picture of an observation; None where its image is of another size than the network's."""
+        if observation.image.shape[:2] != self.network.config.image_size:
+            return None
+        if observation.time < self._time:  # another episode
+            self._history.clear()
+        self._time = observation.time
+        self._history.append(observation.image)
+        question = replace(self.question, command=observation.command)
+        attention = attend(self.network, question, list(self._history), self.layer)
+        self._scale = max(self._scale, scale_of([attention.now]))
+        return explained(observation.image, attention, self._scale, width=PANEL_WIDTH)

@@ -16,7 +16,7 @@ import simplejpeg
 from PIL import Image as PillowImage
 
 from caldrive.affordances import SPECS
-from caldrive.datatypes import KMH, Affordances, CameraConfig, Decision, Image, LightState, Step
+from caldrive.datatypes import KMH, Affordances, CameraConfig, Decision, Image, LightState, Observation, Step
 from caldrive.interfaces import World, is_mapped
 from caldrive.results import EpisodeResult, Infraction
 from caldrive.scenarios import Scenario
@@ -43,7 +43,7 @@ FIELDS: Mapping[str, Mapping[str, str]] = {  # the unit of each field, by the ki
     },
 }  # fmt: skip
 
-Attention = Callable[[Image], Image | None]
+Attention = Callable[[Observation], Image | None]
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ class Writer(Protocol):
 class DriveRecording:
     """Tells writers of a drive's episodes, which follow one another in the recording's time, from 0 s on.
 
-    camera: the one that the images come from. attention: makes a picture of where the agent looked from an image, or
-    None; without it there is no such channel. What an agent or a world does not give has no messages.
+    camera: the one that the images come from. attention: makes a picture of where the agent looked in an observation,
+    or None; without it there is no such channel. What an agent or a world does not give has no messages.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class DriveRecording:
         """What a step says."""
         truth, decision = step.truth, step.decision
         yield "/ego", ego_place(truth.ego)
-        yield from self._pictures(step.observation.image)
+        yield from self._pictures(step.observation)
         yield "/affordances/true", _affordances(truth.affordances)
         if decision is not None and decision.affordances is not None:
             yield "/affordances/predicted", _affordances(decision.affordances)
@@ -161,10 +161,11 @@ class DriveRecording:
             yield "/infractions", _remark(infraction)
         self._told = len(self._infractions)
 
-    def _pictures(self, image: Image) -> Iterator[tuple[str, Content]]:
+    def _pictures(self, observation: Observation) -> Iterator[tuple[str, Content]]:
+        image = observation.image
         if image.size > image.shape[-1]:  # a world without a camera gives a single pixel
             yield "/camera", Picture(as_jpeg(image))
-            seen = self.attention(image) if self.attention is not None else None
+            seen = self.attention(observation) if self.attention is not None else None
             if seen is not None:
                 yield "/attention", Picture(as_jpeg(seen))
 
