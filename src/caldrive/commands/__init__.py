@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from tyro.conf import subcommand
 
 from caldrive.commands.answer import Answer
+from caldrive.commands.baselines import Baselines
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
@@ -47,6 +48,7 @@ VERBS: Mapping[str, Verb] = {
     "data": Verb(Data, "Check and describe a recording."),
     "convert": Verb(Convert, "Write a recording in a format that others' code reads."),
     "train": Verb(Train, "Train an agent's network on a recording."),
+    "baselines": Verb(Baselines, "Train the paper's other three systems, every variant and seed."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
