@@ -8,7 +8,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 MODEL := out/model
 
-.PHONY: drive test lint docs coverage newest model results clean
+.PHONY: drive test lint docs coverage newest model baselines results clean
 drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
@@ -38,7 +38,7 @@ newest:
 	rm -rf out/newest
 	$(PYTHON) -m venv out/newest
 	out/newest/bin/pip install --quiet --disable-pip-version-check "$$(grep '^torch==' constraints.txt)"
-	out/newest/bin/pip install --quiet --disable-pip-version-check '.[hdf5,search]'
+	out/newest/bin/pip install --quiet --disable-pip-version-check '.[explain,hdf5,search]'
 	out/newest/bin/pip freeze
 	out/newest/bin/python scripts/every_verb.py
 
@@ -58,6 +58,10 @@ model: $(READY)
 	step evaluate --data $(MODEL)/elsewhere --model $(MODEL)/training/model.safetensors; \
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
+
+# The paper's other three systems from the recording that `make model` makes; a run that was stopped goes on.
+baselines: $(READY)
+	$(BIN)/caldrive baselines --data $(MODEL)/recording --out out/baselines $(ARGS)
 
 # All suites with all drivers, and in docs/results the report's tables and every episode's line (compressed), from which
 # the tables follow again; the HTML reports stay in out/results. A run that was stopped goes on.

@@ -23,6 +23,7 @@ COMMANDS = {
     "benchmark": "--suite suite.json --workers 1 --out run",
     "replay": f"run {KEY} --out replay.mp4",
     "report": "run --out report",
+    "blame": "run --workers 1",
     "collect": "--episodes 2 --duration 8 --workers 1 --out recording",
     "data": "recording --picture labels.png",
     "convert": "recording --validation-share 0.5 --out corl2017",
@@ -32,11 +33,15 @@ COMMANDS = {
     "--batch 2 --seeds 1 --joint-steps 1 --workers 1 --out search",
     "evaluate": "--data recording --model training/model.safetensors --worst worst.png",
     "see": "labels.png --out see.mp4",
+    "explain drive": "--seconds 0.3 --out attention.mp4",
+    "explain pictures": "labels.png --out seen.mp4",
+    "explain recording": "recording --examples 1 --out attention.png",
     "town": "--town town02 --plan plan.png",
     "speed world": "--town town02 --steps 3",
     "speed agent": "--steps 3",
     "determinism": "--agent oracle --town town02 --seconds 1",
 }
+TAKE_DAYS = ("baselines",)  # whose trainings are those of the verb train
 ERRORS = ("drive --wings 2", "drive --town mars", "report gone", "fly")
 
 

@@ -35,6 +35,7 @@ INPUTS: dict[str, tuple[str, ...]] = {  # {} stands for the path
 }
 OUTPUTS: dict[str, tuple[str, ...]] = {
     "drive": ("drive", "--agent", "oracle", "--seconds", "0.2", "--out", "{}"),
+    "drive, record": (*DRIVE, "--agent", "oracle", "--record", "{}.mcap"),
     "benchmark": (*BENCHMARK, "--out", "{}"),
     "replay": ("replay", "run", "x", "--out", "{}.mp4"),
     "collect": ("collect", "--out", "{}"),

@@ -171,13 +171,14 @@ class CameraConfig:
 @dataclass(frozen=True)
 class Observation:
     """All that an agent may see: time (s), image (H, W, 3), speed (m/s) and the command. image_time: when the image was
-    taken (s), None for now."""
+    taken (s), None for now. auxiliary: the image of a second camera, for an agent that asks for one."""
 
     time: float
     image: Image
     speed: float
     command: Command
     image_time: float | None = None
+    auxiliary: Image | None = None
 
 
 @dataclass(frozen=True)

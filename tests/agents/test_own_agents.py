@@ -80,7 +80,10 @@ def test_it_may_be_a_class_of_a_module_or_offered_by_an_installed_package(
     drives.append(run_json(*DRIVE, "--no-video", "--agent", "cruiser:Cruiser", "--out", str(tmp_path)))
     assert drives[0] == drives[1] == drives[2]
     refused = refusal(capsys, *DRIVE, "--agent", "crusier", "--out", str(tmp_path))
-    assert "found agent 'crusier', wanted one of cal, oracle, cil, cruiser, or your own class" in refused
+    assert (
+        "found agent 'crusier', wanted one of cal, oracle, cil, mp, rl, rl-oracle, cruiser, or your own class"
+        in refused
+    )
 
 
 def test_a_benchmark_broken_off_goes_on_to_the_same_results(

@@ -26,7 +26,7 @@ from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.timing import Stopwatch
 from caldrive.visualization.hud import SIZE
 from caldrive.world.embedded import EmbeddedWorld
-from scripts.every_verb import COMMANDS, words
+from scripts.every_verb import COMMANDS, TAKE_DAYS, words
 from tests.command_line import refusal, run_json
 
 DRIVE = ["drive", "--town", "town02", "--task", "straight", "--cars", "3", "--people", "5"]
@@ -211,7 +211,7 @@ def test_what_a_library_prints_is_not_in_the_answer(monkeypatch: pytest.MonkeyPa
 
 
 def test_every_verb_is_run_with_the_newest_libraries() -> None:
-    assert set(COMMANDS) == set(VERBS)
+    assert {*COMMANDS, *TAKE_DAYS} == set(VERBS)
     for verb, options in COMMANDS.items():
         assert parse(words(f"{verb} {options}")).json
 

@@ -11,9 +11,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import caldrive.gym
+from caldrive.agents.reinforcement.actions import control_of
+from caldrive.agents.reinforcement.config import CARLA2017, COMMANDS
 from caldrive.datatypes import CameraConfig, Command, Control, Pose
 from caldrive.gym import DrivingEnv, EnvConfig
-from caldrive.gym.spaces import CARLA2017, COMMANDS, control_of
 from caldrive.results import InfractionKind
 from caldrive.scenarios import Scenario
 from tests.fakes import StraightRoad
@@ -137,15 +138,14 @@ def test_a_step_before_the_first_reset_is_refused() -> None:
 
 
 def test_the_papers_nine_actions_never_steer_and_drive_at_once() -> None:
-    config = EnvConfig(action="carla2017")
-    controls = [control_of(config, k) for k in range(len(CARLA2017))]
+    controls = [control_of("carla2017", k) for k in range(len(CARLA2017))]
     assert all(control.steer == 0 or control.throttle == control.brake == 0 for control in controls)
     assert controls[1] == Control(brake=1.0)
     assert controls[5].steer == 1.0  # -1 is to the left
 
 
 def test_an_action_beyond_its_bounds_is_cut() -> None:
-    assert control_of(EnvConfig(), [-3.0, 2.0]) == Control(brake=1.0, steer=1.0)
+    assert control_of("continuous", [-3.0, 2.0]) == Control(brake=1.0, steer=1.0)
 
 
 def test_the_command_is_seen(monkeypatch: pytest.MonkeyPatch, road: DrivingEnv) -> None:

@@ -61,8 +61,11 @@ def test_the_wanted_speed_falls_to_nothing_before_cars_people_and_red_lights() -
         person = PedestrianState(Pose(x, 0.5, 0), on_road=on_road)
         assert wanted_speed(replace(START, pedestrians=(person,))) == pytest.approx(speed)
     light = TrafficLight("a", Pose(7.5, -3, 0), LightState.RED, ((7.5, 1.8), (7.5, -1.8)))
-    red = replace(START, lights=(light,), affordances=Affordances(red_light=1.0))
-    assert wanted_speed(red) == pytest.approx(3.0)
+    too_late = replace(START, lights=(light,))
+    assert wanted_speed(too_late) == pytest.approx(3.0)
+    assert wanted_speed(replace(too_late, affordances=Affordances(red_light=1.0))) == 0
+    for other in (replace(light, state=LightState.GREEN), replace(light, pose=Pose(7.5, -3, 2.0))):
+        assert wanted_speed(replace(START, lights=(other,))) == pytest.approx(6.0)
 
 
 def test_weights_can_be_changed() -> None:

@@ -1,6 +1,6 @@
 """Agents by name: what makes each one, which camera it wants, and what its results depend on.
 
-Beside the names in `rows.AGENTS`, `--agent` takes what an installed package offers in the entry-point group
+Beside the names in AGENTS, `--agent` takes what an installed package offers in the entry-point group
 `caldrive.agents`, `package.module:Class` and `file.py:Class`. Such a class is an `interfaces.Agent`. Its maker is given
 `model` (a path or None), `controller` (an `interfaces.Controller`), `cap` (km/h or None) and `dt` (s) where it has
 parameters of these names; its attribute `camera` says which camera it wants.
@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from caldrive.agents.rows import AGENTS, AgentEntry, require_taken
+from caldrive.agents.compared_rows import COMPARED_AGENTS
+from caldrive.agents.rows import OWN_AGENTS, AgentEntry, require_taken
 from caldrive.agents.senses import require_senses
 from caldrive.agents.settings import AgentSettings
 from caldrive.control.presets import controller_source, make_controller
@@ -19,6 +20,7 @@ from caldrive.interfaces import Agent, TruthSource
 from caldrive.plugins import Plugin, attribute, find_plugin
 from caldrive.provenance import file_digest
 
+AGENTS = OWN_AGENTS | COMPARED_AGENTS
 OFFERED = ("model", "controller")  # settings that somebody's own class may take
 
 

@@ -1,4 +1,4 @@
-"""The package's own agents, a row each: what makes one, which camera it wants, and what its results depend on."""
+"""What a row of the registry is, and the rows of CAL and of the oracle."""
 
 from __future__ import annotations
 
@@ -34,6 +34,8 @@ class AgentEntry:
     """Whether it knows the truth, and so is no agent under test."""
     variants: Mapping[str, str] = field(default_factory=dict)
     """Other ways in which it can drive, with a word on each."""
+    auxiliary: Callable[[AgentSettings], CameraConfig | None] = lambda _: None
+    """The second camera that it wants, None for most."""
 
 
 def model_path(model: Path | None, agent: str = "cal") -> Path:
@@ -58,16 +60,6 @@ def require_taken(agent: str, taken: Sequence[str], settings: AgentSettings, hin
             )
 
 
-def _require_variant(agent: str, settings: AgentSettings) -> None:
-    """Raises ValueError where settings name a way of driving that an agent does not have."""
-    variants = AGENTS[agent].variants
-    if settings.variant is not None and settings.variant not in variants:
-        raise ValueError(
-            f"found --variant {settings.variant}, wanted one of {', '.join(variants)} for the agent {agent}: "
-            f"type --variant {next(iter(variants))}, or leave it out"
-        )
-
-
 def make_cal(settings: AgentSettings, dt: float, threads: int | None = 1) -> CALAgent:
     """The agent that drives by a network. dt: seconds of a step. threads: how many it may use, None for all cores."""
     from caldrive.agents.cal import CALAgent
@@ -77,7 +69,8 @@ def make_cal(settings: AgentSettings, dt: float, threads: int | None = 1) -> CAL
     return CALAgent(perception, make_controller(settings.controller, settings.cap, dt))
 
 
-def _cal_camera(settings: AgentSettings) -> CameraConfig:
+def cal_camera(settings: AgentSettings) -> CameraConfig:
+    """The camera of the agent cal. Raises ValueError where its network would take many times as long as it should."""
     from caldrive.perception.network.checkpoint import read_info
 
     path = model_path(settings.model)
@@ -91,7 +84,8 @@ def _cal_camera(settings: AgentSettings) -> CameraConfig:
     return CameraConfig(width=network.image_width, height=network.image_height)
 
 
-def _cal_provenance(settings: AgentSettings) -> dict[str, Any]:
+def cal_provenance(settings: AgentSettings) -> dict[str, Any]:
+    """What the results of the agent cal depend on. Raises ValueError for settings that it does not take."""
     from caldrive.perception.inference.precision import driving_precision
     from caldrive.perception.network.checkpoint import read_info
 
@@ -113,39 +107,9 @@ def _oracle_provenance(settings: AgentSettings) -> dict[str, Any]:
     return {}
 
 
-def _make_cil(settings: AgentSettings, dt: float, truth: TruthSource | None) -> Agent:
-    from caldrive.agents.conditional_imitation.agent import ImitationAgent, rules_for
-
-    avoid_stopping = settings.variant == "avoid-stopping"
-    return ImitationAgent(model_path(settings.model, "cil"), rules_for(settings.cap), avoid_stopping=avoid_stopping)
-
-
-def _cil_camera(settings: AgentSettings) -> CameraConfig:
-    from caldrive.agents.conditional_imitation.checkpoint import read_imitation_info
-
-    network = read_imitation_info(model_path(settings.model, "cil")).config
-    return CameraConfig(width=network.image_width, height=network.image_height)
-
-
-def _cil_provenance(settings: AgentSettings) -> dict[str, Any]:
-    from caldrive.agents.conditional_imitation.checkpoint import read_imitation_info
-    from caldrive.perception.inference.precision import driving_precision
-
-    require_taken("the agent cil", ("model", "variant"), settings)
-    _require_variant("cil", settings)
-    path = model_path(settings.model, "cil")
-    return {"model": file_digest(path), "precision": driving_precision("auto", read_imitation_info(path).ranges)}
-
-
-AGENTS: dict[str, AgentEntry] = {
+OWN_AGENTS: dict[str, AgentEntry] = {
     "cal": AgentEntry(
-        make=lambda settings, dt, _: make_cal(settings, dt), camera=_cal_camera, provenance=_cal_provenance
+        make=lambda settings, dt, _: make_cal(settings, dt), camera=cal_camera, provenance=cal_provenance
     ),
     "oracle": AgentEntry(make=_make_oracle, camera=lambda _: None, provenance=_oracle_provenance, privileged=True),
-    "cil": AgentEntry(
-        make=_make_cil,
-        camera=_cil_camera,
-        provenance=_cil_provenance,
-        variants={"avoid-stopping": "with the released agent's forced-stop fix"},
-    ),
 }

@@ -13,13 +13,14 @@ class AgentSettings:
     """Who drives."""
 
     agent: str = "cal"
-    """Who drives: cal sees the camera image only, oracle knows the truth; cil imitates; or your own:
-    package.module:Class or file.py:Class."""
+    """Who drives: cal sees the camera image only, oracle knows the truth; cil imitates; mp segments the image and plans
+    by rules; rl learnt by trial and error, rl-oracle drives its policy by the truth; or your own: package.module:Class
+    or file.py:Class."""
     model: Path | None = None
     """The network of the agent, a .safetensors file; without it the one in the package. Your own class may take it,
     too."""
     variant: str | None = None
-    """Another way in which the agent can drive: avoid-stopping for cil."""
+    """Another way in which the agent can drive: avoid-stopping for cil, auxiliary-camera for mp."""
     controller: str = "default"
     """default, paper (the laws as printed), a .toml file of constants, package.module:Class or file.py:Class."""
     cap: float | None = None

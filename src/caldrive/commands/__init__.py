@@ -14,10 +14,11 @@ from typing import Annotated, Any
 from tyro.conf import subcommand
 
 from caldrive.commands.answer import Answer
+from caldrive.commands.baselines import Baselines
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
-from caldrive.commands.explain import Blame
+from caldrive.commands.explain import Blame, ExplainDrive, ExplainPictures, ExplainRecording
 from caldrive.commands.search import Search
 from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
@@ -41,10 +42,14 @@ VERBS: Mapping[str, Verb] = {
     "replay": Verb(Replay, "Drive a benchmark's episode again, and film it."),
     "report": Verb(Report, "Tables and a page on one or more benchmarks."),
     "blame": Verb(Blame, "Say which affordance is to blame for a benchmark's failures."),
+    "explain drive": Verb(ExplainDrive, "Film where the network looks in a drive."),
+    "explain pictures": Verb(ExplainPictures, "Film where it looks in your own video or pictures."),
+    "explain recording": Verb(ExplainRecording, "Draw where it looks in recorded frames, and measure it."),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
     "convert": Verb(Convert, "Write a recording in a format that others' code reads."),
     "train": Verb(Train, "Train an agent's network on a recording."),
+    "baselines": Verb(Baselines, "Train the paper's other three systems, every variant and seed."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
     "search": Verb(Search, "Search for better task blocks of the network."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
@@ -53,7 +58,10 @@ VERBS: Mapping[str, Verb] = {
     "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),
     "determinism": Verb(Determinism, "Drive the same episode twice and compare all bytes."),
 }
-GROUPS = {"speed": "Measure how fast the world or the agent is."}  # first words of verbs of two words
+GROUPS = {
+    "explain": "Show where the network looks.",
+    "speed": "Measure how fast the world or the agent is.",
+}  # first words of verbs of two words
 
 
 def verb_words(arguments: Sequence[str]) -> str:

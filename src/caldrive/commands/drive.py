@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from caldrive.commands.answer import Answer, Configurable
 from caldrive.driving.settings import DeterminismSettings, DriveSettings
@@ -13,6 +14,9 @@ from caldrive.progress import Progress
 class Drive(DriveSettings, Configurable):
     """Drive episodes, film them, and write down what happened."""
 
+    attention: str | None = None
+    """An affordance whose attention is recorded beside the camera with --record or --view: where the network of
+    caldrive explain looks."""
     strict: bool = False
     """End with exit code 1 unless every episode reached its goal."""
 
@@ -21,8 +25,21 @@ class Drive(DriveSettings, Configurable):
         from caldrive.commands.tables import drive_table
         from caldrive.driving.drive import drive
 
-        report = drive(self, progress)
+        report = drive(self, progress, self._attention())
         return Answer(report.values(), drive_table(report), int(self.strict and not report.all_reached))
+
+    def _attention(self) -> Any:
+        """What draws the attention, where it is asked for. Raises ValueError where nothing would show it."""
+        if self.attention is None:
+            return None
+        if self.record is None and not self.view:
+            raise ValueError(
+                f"found --attention {self.attention} in a drive that is not recorded, wanted --record or --view: type "
+                "--record out/drive.mcap, or caldrive explain drive for a film"
+            )
+        from caldrive.explain.attention_video import LiveAttention
+
+        return LiveAttention(self.attention, self.model if self.agent == "cal" else None)
 
 
 @dataclass(frozen=True, kw_only=True)

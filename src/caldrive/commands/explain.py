@@ -1,13 +1,16 @@
-"""The verbs that explain: whom to blame for a benchmark's failures."""
+"""The verbs that explain: whom to blame for a benchmark's failures, and where the network looks."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 import tyro
+from tyro.conf import UseAppendAction
 
-from caldrive.commands.answer import Answer, Output
+from caldrive.commands.answer import Answer, Configurable, Output
+from caldrive.driving.settings import EpisodeSettings, SeeSettings
 from caldrive.progress import Progress
 
 
@@ -34,3 +37,94 @@ class Blame(Output):
             "episodes": len(run.results), "rest": found.rest, "blame": {key: found.of(key) for key in found.failures},
         }  # fmt: skip
         return Answer(values, blame_table(found, run.name, len(run.results)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttentionSettings:
+    """What attention is drawn of."""
+
+    affordance: UseAppendAction[tuple[str, ...]] = ()
+    """An affordance to draw the attention of; may be given again. Without it hazard_stop and red_light."""
+    layer: Literal["coarse", "fine"] = "coarse"
+    """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
+
+    @property
+    def affordances(self) -> tuple[str, ...]:
+        """Those that are drawn."""
+        return self.affordance or ("hazard_stop", "red_light")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainDrive(AttentionSettings, EpisodeSettings, Configurable):
+    """Drive an episode, and film where the network looks (Grad-CAM), whoever drives."""
+
+    out: Path = Path("out/attention.mp4")
+    """The video."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Drives; answers with the video."""
+        from caldrive.explain.attention_video import drive_attention
+
+        frames = drive_attention(self, self.affordances, self.layer, self.out, progress)
+        return Answer({"video": str(self.out), "frames": frames}, f"attention in {frames} frames: {self.out}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainPictures(AttentionSettings, SeeSettings, Output):
+    """Film where the network looks in your own video or pictures."""
+
+    out: Path = Path("out/attention.mp4")
+    """The video."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Looks at the pictures; answers with the video."""
+        from caldrive.explain.attention_video import see_attention
+
+        frames = see_attention(self, self.affordances, self.layer, progress)
+        return Answer({"video": str(self.out), "frames": frames}, f"attention in {frames} pictures: {self.out}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainRecording(Output):
+    """Where the network looks in frames of a recording in which it matters, and how true that is, in numbers."""
+
+    folder: tyro.conf.Positional[Path] = Path("out/recording")
+    """Folder with the recorded episodes."""
+    model: Path | None = None
+    """The network, a .safetensors file; without it the one in the package."""
+    held_out: bool = False
+    """Only those episodes that training on this folder kept for validation."""
+    examples: int = 4
+    """Frames of each situation on the sheet."""
+    measured: int = 0
+    """Frames of each situation that are measured, which takes several seconds each; 0 measures none."""
+    layer: Literal["coarse", "fine"] = "coarse"
+    """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
+    seed: int = 0
+    """Decides which frames."""
+    out: Path = Path("out/attention.png")
+    """The sheet, a PNG file."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Draws the sheet; answers with the figures."""
+        from caldrive.agents.rows import model_path
+        from caldrive.checks import require_within, require_writable_file
+        from caldrive.commands.tables import attention_table
+        from caldrive.explain.recorded import contact_sheet, figures
+        from caldrive.explain.situations import find_examples
+        from caldrive.files import write_whole
+        from caldrive.perception.network.checkpoint import load_network
+
+        require_writable_file(self.out, "--out", ".png")
+        require_within("--examples", self.examples, 1, 100, 4)
+        require_within("--measured", self.measured, 0, 10_000, 20)
+        network, info = load_network(model_path(self.model))
+        keys = info.data.get("validation_episodes", []) if self.held_out else None
+        wanted = max(self.examples, self.measured)
+        found = find_examples(self.folder, wanted, network.span - 1, self.seed, keys)
+        shown = {name: chosen[: self.examples] for name, chosen in found.items()}
+        write_whole(self.out, contact_sheet(network, shown, self.layer))
+        measured = {name: chosen[: self.measured] for name, chosen in found.items()}
+        results = figures(network, measured, self.layer, self.seed, progress) if self.measured else []
+        values = {"out": str(self.out), "figures": [asdict(one) for one in results]}
+        return Answer(values, attention_table(results, self.out))

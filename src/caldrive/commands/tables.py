@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.driving.drive import DriveReport
     from caldrive.driving.speed import WorldTiming
     from caldrive.explain.blame import Blame
+    from caldrive.explain.recorded import Figures
     from caldrive.perception.evaluation.report import Report
     from caldrive.recordings.check import RecordingSummary
     from caldrive.search.run import Findings
@@ -53,8 +54,9 @@ def drive_table(report: DriveReport) -> Group:
     reached = sum(result.outcome is Outcome.SUCCESS for result in report.results)
     infractions = sum(len(result.infractions) for result in report.results)
     summary = f"{reached} of {len(report.results)} reached the goal in time; infractions: {infractions or 'none'}"
-    video = [Text(f"video: {report.video}")] if report.video else []
-    return Group(table, Text(summary), *video, Text(f"episodes: {report.files[0].parent}"))
+    made = {"video": report.video, "recording": report.recording}
+    lines = [Text(f"{name}: {path}") for name, path in made.items() if path]
+    return Group(table, Text(summary), *lines, Text(f"episodes: {report.files[0].parent}"))
 
 
 def world_table(speed: WorldTiming, ratios: Mapping[str, float]) -> Group:
@@ -196,6 +198,24 @@ def blame_table(blame: Blame, name: str, episodes: int) -> Group:
     table.add_row("all of them", str(len(blame.rescued["all"])), "")
     table.add_row("controller and world", "", str(len(blame.rest)))
     return Group(Text(f"{name}: {failures} of {episodes} episodes went wrong"), table)
+
+
+def attention_table(figures: Sequence[Figures], out: Path) -> Group:
+    """How true the attention is, a row for each situation."""
+    said = Text(f"attention: {out}")
+    if not figures:
+        return Group(said)
+    heads = ("situation", "frames", "points at it", "on it", "its area", "deletion", "insertion", "new weights")
+    table = Table(*heads, box=SIMPLE_HEAD)
+    for one in figures:
+        where = ["" if value is None else f"{100 * value:.1f} %" for value in (one.pointing, one.energy, one.area)]
+        curves = (one.network, one.random, one.centred)
+        lost = " ".join(f"{curve.deletion:.2f}" for curve in curves)
+        won = " ".join(f"{curve.insertion:.2f}" for curve in curves)
+        cascade = " ".join(f"{value:.2f}" for value in one.cascade)
+        table.add_row(one.situation, str(one.examples), *where, lost, won, cascade)
+    note = "deletion, insertion: of the attention, of random maps, of the middle; new weights: rank correlation with it"
+    return Group(table, Text(note), said)
 
 
 def search_table(findings: Findings, page: Path) -> Group:

@@ -14,10 +14,17 @@ from caldrive.agents.conditional_imitation.config import (
     ImitationConfig,
     ImitationNetworkConfig,
 )
+from caldrive.agents.modular_pipeline.config import (
+    PIPELINE_TRAININGS,
+    SEGMENTATION_NETWORK,
+    PipelineConfig,
+    SegmentationConfig,
+)
 from caldrive.commands.answer import TYPED, Answer, Configurable, Output
 from caldrive.perception.network.config import NETWORKS, NetworkConfig
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
 from caldrive.progress import Progress
+from caldrive.reinforcement.config import REINFORCEMENTS, ReinforcementConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +35,8 @@ class Train(Configurable):
     BY_AGENT: ClassVar[dict[str, type[Any]]] = {}
 
     agent: Literal["cal"] = field(default="cal", metadata=TYPED)
-    """Whose network: cal, or cil (conditional imitation learning), which has options of its own: caldrive train --agent
-    cil --help."""
+    """Whose network: cal; or cil (conditional imitation learning), mp (modular pipeline) or rl (reinforcement
+    learning), which have options of their own: caldrive train --agent cil --help."""
     data: Path = Path("out/recording")
     """Folder with the recorded episodes."""
     out: Path = Path("out/training")
@@ -99,7 +106,76 @@ TrainImitation.PRESETS.update(
         for name in IMITATION_TRAININGS
     }
 )
-Train.BY_AGENT.update(cal=Train, cil=TrainImitation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainPipeline(Configurable):
+    """Train the segmentation network of the modular pipeline on a recording; a run that was stopped goes on."""
+
+    PRESETS: ClassVar[dict[str, TrainPipeline]] = {}
+
+    agent: Literal["mp"] = field(default="mp", metadata=TYPED)
+    """Whose network."""
+    data: Path = Path("out/recording")
+    """Folder with the recorded episodes, with semantic images."""
+    out: Path = Path("out/segmentation")
+    """Folder for model.safetensors, the state of the run, its metrics and their curves."""
+    preset: str = "all-frames"
+    """What all other options begin with: all-frames, or published: 2,500 frames without augmentation."""
+    training: Annotated[PipelineConfig, arg(name=""), FlagConversionOff] = field(
+        default=PIPELINE_TRAININGS["all-frames"], metadata={"flat": True}
+    )
+    network: Annotated[SegmentationConfig, FlagConversionOff] = SEGMENTATION_NETWORK
+    """The network that is trained."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Trains; answers with the network's file."""
+        from caldrive.agents.modular_pipeline.learner import train_pipeline
+        from caldrive.checks import require_writable_folder
+        from caldrive.perception.training.distributed import keep_freed_memory
+
+        require_writable_folder(self.out)
+        keep_freed_memory()
+        model = train_pipeline(self.training, self.data, self.out, self.network, progress)
+        return Answer({"model": str(model)}, f"trained: caldrive drive --agent mp --model {model}")
+
+
+TrainPipeline.PRESETS.update(
+    {name: TrainPipeline(preset=name, training=PIPELINE_TRAININGS[name]) for name in PIPELINE_TRAININGS}
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainReinforcement(Configurable):
+    """Train a policy by trial and error in the embedded town; a run that was stopped goes on."""
+
+    PRESETS: ClassVar[dict[str, TrainReinforcement]] = {}
+
+    agent: Literal["rl"] = field(default="rl", metadata=TYPED)
+    """Whose policy."""
+    out: Path = Path("out/reinforcement")
+    """Folder for model.safetensors, the state of the run, checkpoints, its metrics and their curves."""
+    preset: str = "modern"
+    """What all other options begin with: paper, as the CARLA paper's RL; modern, over a frozen encoder; affordances, on
+    the true ones; or predicted, on those of CAL's network."""
+    training: Annotated[ReinforcementConfig, arg(name=""), FlagConversionOff] = field(
+        default=REINFORCEMENTS["modern"], metadata={"flat": True}
+    )
+
+    def run(self, progress: Progress) -> Answer:
+        """Trains; answers with the policy's file."""
+        from caldrive.checks import require_writable_folder
+        from caldrive.reinforcement.train import train_rl
+
+        require_writable_folder(self.out)
+        model = train_rl(self.training, self.out, progress)
+        return Answer({"model": str(model)}, f"trained: caldrive drive --agent rl --model {model}")
+
+
+TrainReinforcement.PRESETS.update(
+    {name: TrainReinforcement(preset=name, training=REINFORCEMENTS[name]) for name in REINFORCEMENTS}
+)
+Train.BY_AGENT.update(cal=Train, cil=TrainImitation, mp=TrainPipeline, rl=TrainReinforcement)
 Train.PRESETS.update({name: Train(preset=name, training=TRAININGS[name], network=NETWORKS[name]) for name in TRAININGS})
 
 

@@ -48,6 +48,11 @@ class DriveSettings(EpisodeSettings):
     video: bool = True
     """Film the drive. --no-video leaves out drive.mp4 and the plots of speed (PNG), and writes each episode's trace
     (episode-000.json) alone."""
+    record: Annotated[Path | None, arg(metavar="FILE.mcap")] = None
+    """Record the drive for Foxglove, Lichtblick or Rerun: camera, affordances, controller, signals, map, others and
+    infractions, all episodes in one file. Needs pip install 'caldrive[record]'."""
+    view: bool = False
+    """Watch the same live in Rerun, on this machine. Needs pip install 'caldrive[view]'."""
     out: Path = Path("out/drive")
     """Folder for drive.mp4, and for each episode its trace (JSON) and its speed over distance (PNG)."""
 

@@ -21,14 +21,20 @@ WORLD_METHODS = ("reset", "step", "truth", "close")  # of `interfaces.World`
 def make_world(name: str = "embedded", camera: CameraConfig | None = None, **more: Any) -> World:
     """A world by name: `embedded`, or an `interfaces.World`: `package.module:Class`, `file.py:Class` or an entry point.
 
-    camera: the agent's; None drives without images. more: what only some worlds take, such as a stopwatch. Raises
-    ValueError for an unknown name and a class that is no World.
+    camera: the agent's; None drives without images. more: what only some worlds take, such as a stopwatch or a second
+    camera (auxiliary). Raises ValueError for an unknown name, a class that is no World, and one that takes no second
+    camera where one is asked for.
     """
     if name == "embedded":
         from caldrive.world.embedded import EmbeddedWorld
 
         return EmbeddedWorld(camera, **more)
     plugin = find_plugin(name, "world", WORLDS)
+    if more.get("auxiliary") and not plugin.takes("auxiliary"):
+        raise ValueError(
+            f"found that {plugin.name} takes no second camera, wanted a parameter auxiliary: add it, or leave "
+            "--variant out"
+        )
     world: World = plugin.build(camera=camera, **more)
     _check_world(world, plugin.name)
     return world
@@ -59,7 +65,8 @@ def set_up(settings: AgentSettings, world_name: str = "embedded", images: bool =
     """
     entry = agent_entry(settings.agent)
     camera = entry.camera(settings) or (CameraConfig() if images else None)
-    world = make_world(world_name, camera)
+    auxiliary = entry.auxiliary(settings)
+    world = make_world(world_name, camera, **({"auxiliary": auxiliary} if auxiliary else {}))
     try:
         knows = (lambda: truth_of(world)) if entry.privileged or settings.truth else None
         agent = entry.make(settings, world.dt, knows if entry.privileged else None)

@@ -44,19 +44,22 @@ class EnvConfig:
     """Of the reward's terms, in place of the preset's."""
     ends: tuple[InfractionKind, ...] = (*COLLISION.values(), InfractionKind.SIDEWALK)
     """Infractions that terminate an episode."""
+    leaves_route: bool = False
+    """Whether it also terminates where the car is 2 m or more beside the centre line of its route (Toromanoff et al.
+    2020), as on a wrong way nothing can be learnt of the right one."""
     rules: str = "strict"
     """What counts as an infraction: strict, corl2017 or nocrash."""
 
     def __post_init__(self) -> None:
-        _require("reward", self.reward, PRESETS)
-        _require("rules", self.rules, RULES)
-        _require("time_limit", self.time_limit, TIME_LIMITS)
-        _require("observation", self.observation, ("image", "affordances"))
-        _require("action", self.action, ("continuous", "carla2017"))
+        require_one_of("reward", self.reward, PRESETS)
+        require_one_of("rules", self.rules, RULES)
+        require_one_of("time_limit", self.time_limit, TIME_LIMITS)
+        require_one_of("observation", self.observation, ("image", "affordances"))
+        require_one_of("action", self.action, ("continuous", "carla2017"))
         for task in self.tasks:
-            _require("tasks", task, TASKS)
+            require_one_of("tasks", task, TASKS)
         for name in self.weights:
-            _require("weights", name, PRESETS[self.reward].weights)
+            require_one_of("weights", name, PRESETS[self.reward].weights)
         if not (self.towns and self.weathers and self.tasks and self.frame_skip >= 1):
             raise ValueError("found no town, weather, task or step, wanted one of each at least: give some")
 
@@ -65,7 +68,7 @@ def configured(config: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
     """The settings with some changed, by their names. Raises ValueError for a name that is none of them."""
     names = [field.name for field in fields(EnvConfig)]
     for name in changes:
-        _require("setting", name, names)
+        require_one_of("setting", name, names)
     return replace(config, **{name: _frozen(value) for name, value in changes.items()})
 
 
@@ -73,7 +76,7 @@ def _frozen(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-def _require(what: str, value: str, allowed: Any) -> None:
+def require_one_of(what: str, value: str, allowed: Any) -> None:
     """Raises ValueError where a value is none of the allowed; the nearest of them is named."""
     if value not in allowed:
         near = get_close_matches(str(value), map(str, allowed), n=1, cutoff=0.0)

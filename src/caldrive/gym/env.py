@@ -7,14 +7,15 @@ from typing import Any
 
 import gymnasium
 
-from caldrive.datatypes import Control, Image, Observation, Truth
+from caldrive.agents.reinforcement.actions import control_of
+from caldrive.datatypes import MAX_CENTER_DISTANCE, Control, Observation, Truth
 from caldrive.driving.referee import Referee
 from caldrive.driving.rules import RULES
 from caldrive.driving.setup import make_world
 from caldrive.driving.tasks import task_scenarios
 from caldrive.gym.config import EnvConfig, configured
 from caldrive.gym.rewards import PRESETS, Moment
-from caldrive.gym.spaces import action_space, control_of, observation_space, observed
+from caldrive.gym.spaces import action_space, observation_space, observed
 from caldrive.interfaces import World
 from caldrive.results import InfractionKind, Outcome
 from caldrive.scenarios import Scenario
@@ -33,13 +34,20 @@ class _Drive:
 
     referee: Referee
     truth: Truth
-    image: Image
+    observation: Observation
     last: Control = field(default_factory=Control)
     """What was done before."""
     reward: float = 0.0
     """The sum."""
     length: int = 0
     """Actions."""
+    left_route: bool = False
+    """Whether this has ended it."""
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether there is nothing more to do."""
+        return self.left_route or self.referee.outcome is not None
 
 
 class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
@@ -75,27 +83,37 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
         world = self._open_world()
         observation = world.reset(scenario)
         referee = Referee(scenario, self.config.ends, RULES[self.config.rules])
-        self._drive = _Drive(referee, world.truth(), observation.image)
+        self._drive = _Drive(referee, world.truth(), observation)
         referee.watch(self._drive.truth)
         return observed(self.config, observation, self._drive.truth), self._info(self._drive)
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Drives on for `frame_skip` steps of 0.1 s, or until the episode ends."""
-        drive, control, total = self._current, control_of(self.config, action), dict[str, float]()
+        drive, control, total = self._current, control_of(self.config.action, action), dict[str, float]()
         for _ in range(self.config.frame_skip):
             observation = self._move(drive, control, total)
-            if drive.referee.outcome is not None:
+            if drive.has_ended:
                 break
         reward, outcome = sum(total.values()), drive.referee.outcome
         drive.reward += reward
         drive.length += 1
         info = self._info(drive) | {"rewards": total, "step_reward": reward}
-        ended = outcome in (Outcome.SUCCESS, Outcome.FAILED)
-        return observed(self.config, observation, drive.truth), reward, ended, outcome is Outcome.TIMEOUT, info
+        terminated = outcome in (Outcome.SUCCESS, Outcome.FAILED) or drive.left_route
+        truncated = outcome is Outcome.TIMEOUT and not terminated
+        return observed(self.config, observation, drive.truth), reward, terminated, truncated, info
 
     def render(self) -> Any:
         """The image of the last step (H, W, 3), None without a render mode."""
-        return self._current.image.copy() if self.render_mode is not None else None
+        return self._current.observation.image.copy() if self.render_mode is not None else None
+
+    @property
+    def observation(self) -> Observation:
+        """What an agent may see now, as outside of gymnasium. Raises RuntimeError before the first episode."""
+        return self._current.observation
+
+    def truth(self) -> Truth:
+        """What really is, now: no agent under test may know it. Raises RuntimeError before the first episode."""
+        return self._current.truth
 
     def close(self) -> None:
         """Ends the world."""
@@ -107,9 +125,11 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
         """One step of the world; adds its reward's terms to the total."""
         before = drive.truth
         observation = self._open_world().step(control)
-        drive.truth, drive.image = self._open_world().truth(), observation.image
+        drive.truth, drive.observation = self._open_world().truth(), observation
         broke = drive.referee.watch(drive.truth) is Outcome.FAILED
-        moment = Moment(before, drive.truth, drive.last, control, broke)
+        aside = abs(drive.truth.affordances.center_distance)
+        drive.left_route = self.config.leaves_route and aside >= MAX_CENTER_DISTANCE
+        moment = Moment(before, drive.truth, drive.last, control, broke or drive.left_route)
         for name, value in PRESETS[self.config.reward].rewards(moment, self.config.weights).items():
             total[name] = total.get(name, 0.0) + value
         drive.last = control
@@ -158,6 +178,7 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
             **{key: kind in broken for kind, key in COLLISION_KEYS.items()},
             "crash": not broken.isdisjoint(COLLISION_KEYS),
             "crash_sidewalk": InfractionKind.SIDEWALK in broken,
+            "left_route": drive.left_route,
             "out_of_road": truth.sidewalk_share > 0,
             "route_completion": min(1.0, max(0.0, truth.route_done / truth.route_length)),
             "speed": truth.ego.speed,

@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from caldrive.datatypes import KMH, Control, Truth
-from caldrive.geometry import to_local
+from caldrive.datatypes import KMH, Control, LightState, Truth
+from caldrive.geometry import to_local, wrap_angle
 
 MOST_WANTED = 6.0  # m/s, the speed that `roach` wants on a free road
 ROOM = 5.0  # m over which it falls to 0
 BEFORE_CAR, BEFORE_PERSON, BEFORE_LIGHT = 8.0, 6.0, 5.0  # m, between middles, at which it is 0
 CORRIDOR = 2.0  # m to either side in which somebody is ahead
 FARTHEST_LIGHT = 15.0  # m
+FACING = 0.5  # rad between the ways of the ego and of those for whom a light is
 STEADY = 0.01  # of the steering, below which a change is none
 
 
@@ -84,20 +85,21 @@ def wanted_speed(truth: Truth) -> float:
         ahead, left = to_local(truth.ego.pose, (person.pose.x, person.pose.y)).tolist()  # type: ignore[arg-type]
         if ahead > 0 and abs(left) < CORRIDOR and person.on_road:
             gaps.append(ahead - BEFORE_PERSON)
-    if seen.red_light:
-        gaps.append(_to_light(truth) - BEFORE_LIGHT)
+    # Who is asked to stop may do so anywhere. The label ends where it is too late to stop, the fault does not.
+    gaps.append(0.0 if seen.red_light else _to_closed_light(truth) - BEFORE_LIGHT)
     return MOST_WANTED * min(1.0, max(0.0, min(gaps) / ROOM))
 
 
-def _to_light(truth: Truth) -> float:
-    """m from the ego's middle to the nearest stop line ahead."""
-    aheads = []
+def _to_closed_light(truth: Truth) -> float:
+    """m from the ego's middle to the nearest stop line ahead whose light is not green."""
+    aheads = [FARTHEST_LIGHT]
     for light in truth.lights:
         (x0, y0), (x1, y1) = light.stop_line
         ahead, left = to_local(truth.ego.pose, ((x0 + x1) / 2, (y0 + y1) / 2)).tolist()  # type: ignore[arg-type]
-        if 0 < ahead < FARTHEST_LIGHT and abs(left) < CORRIDOR:
+        faces = abs(wrap_angle(light.pose.heading - truth.ego.pose.heading)) < FACING
+        if light.state is not LightState.GREEN and faces and ahead > 0 and abs(left) < CORRIDOR:
             aheads.append(ahead)
-    return min(aheads, default=FARTHEST_LIGHT)
+    return min(aheads)
 
 
 PRESETS: Mapping[str, Preset] = {

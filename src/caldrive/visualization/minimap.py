@@ -34,10 +34,8 @@ class MiniMap:
         self._middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2))
         self._scale = (size - 2 * MARGIN) * OVERSAMPLED / max(x1 - x0, y1 - y0)
         self._base = _town(self, roads)
-        driven = route.line.points[route.line.s < route.length]
-        end = route.line.pose_at(route.length)
         draw = ImageDraw.Draw(self._base)
-        draw.line(self.pixels(np.vstack((driven, [(end.x, end.y)]))), fill=ROUTE, width=3 * OVERSAMPLED, joint="curve")
+        draw.line(self.pixels(route.way), fill=ROUTE, width=3 * OVERSAMPLED, joint="curve")
 
     def pixels(self, points: Points) -> Pixels:
         """Where points (N, 2) of the world lie on the enlarged map."""

@@ -25,7 +25,8 @@ class EmbeddedWorld:
     """A town with traffic, pedestrians, lights and cameras; implements `RecordableWorld`.
 
     camera: the agent's; None drives without images (a black pixel stands for them), for the oracle. vehicle: the ego.
-    stopwatch: to measure the parts of a step with. A process may have several worlds, but only one of them traffic.
+    stopwatch: to measure the parts of a step with. auxiliary: a second camera, for an agent that asks for one. A
+    process may have several worlds, but only one of them traffic.
     """
 
     dt = DT
@@ -36,8 +37,9 @@ class EmbeddedWorld:
         camera: CameraConfig | None = None,
         vehicle: VehicleConfig | None = None,
         stopwatch: Stopwatch | None = None,
+        auxiliary: CameraConfig | None = None,
     ) -> None:
-        self.mount, self.vehicle = camera, vehicle or VehicleConfig()
+        self.mount, self.auxiliary, self.vehicle = camera, auxiliary, vehicle or VehicleConfig()
         self._timed: Timed = stopwatch.part if stopwatch else untimed
         self._episode: Episode | None = None
         self._rig: CameraRig | None = None
@@ -146,6 +148,8 @@ class EmbeddedWorld:
         state = self._current.state
         with self._timed("camera"):
             image = self.images([self.mount])[0] if self.mount is not None else NO_IMAGE
+            aside = self.images([self.auxiliary])[0] if self.auxiliary is not None else None
         return Observation(
-            time=state.time, image=image, speed=state.ego.speed, command=self.route.command_at(state.progress)
-        )
+            time=state.time, image=image, speed=state.ego.speed, command=self.route.command_at(state.progress),
+            auxiliary=aside,
+        )  # fmt: skip

@@ -92,10 +92,10 @@ def convolution(x: Any, conv: nn.Module, high: float, signed: bool, bits: int) -
     return ops.add(x, constant(conv.bias, 1, -1, 1, 1))
 
 
-def backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
-    """The backbone's features (1, F) of an image (1, 3, H, W); its fake quantizations become integers when it is
-    compiled."""
-    x = image
+def stage_graphs(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> list[Any]:
+    """What each stage of the backbone makes (1, C, h, w) of an image (1, 3, H, W); its fake quantizations become
+    integers when it is compiled."""
+    x, stages = image, []
     number = 0
     for stage, norm in zip(backbone.stages, backbone.norms, strict=True):
         assert isinstance(stage, nn.ModuleList)
@@ -106,7 +106,13 @@ def backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits
             number += 1
         x = ops.max_pool(x, strides=[2, 2], dilations=[1, 1], pads_begin=[0, 0], pads_end=[0, 0], kernel_shape=[2, 2])
         x = ops.relu(normalised(x.output(0), norm, 1, -1, 1, 1))
-    return ops.reshape(x, ops.constant([1, -1]), False)
+        stages.append(x)
+    return stages
+
+
+def backbone_graph(image: Any, backbone: Backbone, ranges: Sequence[float], bits: int) -> Any:
+    """The backbone's features (1, F) of an image (1, 3, H, W)."""
+    return ops.reshape(stage_graphs(image, backbone, ranges, bits)[-1], ops.constant([1, -1]), False)
 
 
 class Int8Backbone:

@@ -64,6 +64,12 @@ class Route:
         return any(turn.start <= s <= turn.end for turn in self.turns)
 
     @property
+    def way(self) -> Points:
+        """The points (N, 2) of the line up to the goal, m."""
+        end = self.line.pose_at(self.length)
+        return np.vstack((self.line.points[self.line.s < self.length], [(end.x, end.y)]))
+
+    @property
     def time_limit(self) -> float:
         """Seconds to drive the route at 10 km/h (section 4)."""
         return self.length / PLANNED_SPEED

@@ -1,0 +1,175 @@
+"""Where the network looks: gradient-weighted class activation maps (Selvaraju et al. 2017; section 5 of the paper).
+
+Captum computes them. All frames of a block's history pass the backbone as one batch: called frame by frame, Captum
+would keep the last one's map only and say nothing. The weights are those before they became 8-bit integers, which have
+no gradient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from caldrive.affordances import BY_NAME, AffordanceSpec
+from caldrive.datatypes import Command, Image
+from caldrive.perception.images import normalise, to_float
+from caldrive.perception.network.network import COMMANDS, Network
+from caldrive.perception.targets import decode
+
+Map = NDArray[np.float32]
+# The stage of the backbone, from 0, whose last convolution is looked at: VGG16's last one, as is usual, whose places
+# stand for 16 x 16 pixels, or the last of the stage before.
+LAYERS = {"coarse": 4, "fine": 3}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a network is asked."""
+
+    affordance: str
+    """An affordance by its name."""
+    command: Command = Command.STRAIGHT
+    """What the navigation system asks for meanwhile."""
+    label: int | None = None
+    """A class by its value, such as 60 on a sign; without it the likeliest one, of a probability the positive one."""
+
+    def __post_init__(self) -> None:
+        """Raises ValueError where there is no such affordance or class."""
+        if self.affordance not in BY_NAME:
+            raise ValueError(
+                f"found affordance {self.affordance!r}, wanted one of {', '.join(BY_NAME)}: type --affordance red_light"
+            )
+        if self.label is not None and self.label not in self.spec.classes:
+            classes = ", ".join(map(str, self.spec.classes)) or "none, as it is a number"
+            raise ValueError(
+                f"found class {self.label} of {self.spec.title}, wanted one of its classes ({classes}): give one"
+            )
+
+    @property
+    def spec(self) -> AffordanceSpec:
+        """The affordance's row."""
+        return BY_NAME[self.affordance]
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What a network says."""
+
+    label: str
+    """What was asked in words: a class, or the value itself."""
+    probability: float | None
+    """Of that class; None for a value."""
+    value: float
+    """The likeliest class, or a value in SI units (km/h on signs)."""
+    target: int
+    """The number of the output that was asked about."""
+
+
+@dataclass(frozen=True)
+class Attention:
+    """What a reply is made from, in the images before it."""
+
+    reply: Reply
+    maps: tuple[Map, ...]
+    """For each frame that the block looks at, the oldest first, (h, w): what speaks for the class, never negative, or
+    what makes the value larger (+) and smaller (-)."""
+    back: tuple[int, ...]
+    """How many frames each of them lies back."""
+
+    @property
+    def now(self) -> Map:
+        """The map of the present frame."""
+        return self.maps[-1]
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """The share of all attention that each frame has."""
+        totals = np.array([np.abs(one).sum() for one in self.maps])
+        return tuple((totals / max(totals.sum(), 1e-12)).tolist())
+
+
+def ask(network: Network, question: Question, images: Sequence[Image]) -> Reply:
+    """What a network says in the newest of some images (H, W, 3), the oldest first; where there are fewer than it looks
+    back, the first one stands for those before it."""
+    with torch.no_grad():
+        return _reply(question, _outputs(network, question, _batch(network, question, images)))
+
+
+def attend(network: Network, question: Question, images: Sequence[Image], layer: str = "coarse") -> Attention:
+    """Where a network looks, in images as for `ask`. Raises ValueError for an unknown layer, RuntimeError without
+    Captum."""
+    captum = _require_captum()
+    if layer not in LAYERS:
+        raise ValueError(f"found layer {layer!r}, wanted one of {', '.join(LAYERS)}: type --layer coarse")
+    reply, batch = ask(network, question, images), _batch(network, question, images)
+    gradcam = captum.LayerGradCam(partial(_outputs, network, question), _last_convolution(network, LAYERS[layer]))
+    maps = gradcam.attribute(batch, reply.target, relu_attributions=question.spec.discrete)
+    arrays = maps.detach()[:, 0].numpy().astype(np.float32)
+    return Attention(reply, tuple(arrays), frames_back(network, question.affordance))
+
+
+def frames_back(network: Network, affordance: str) -> tuple[int, ...]:
+    """How many frames back each frame lies that the block of an affordance looks at, the oldest first."""
+    config = network.task_blocks()[affordance].config
+    return tuple(k * config.dilation for k in reversed(range(config.length)))
+
+
+def upsampled(one: Map, size: tuple[int, int]) -> Map:
+    """A map (h, w) at the size (H, W) of an image, bilinear."""
+    grid = torch.from_numpy(one)[None, None]
+    result: Map = nn.functional.interpolate(grid, size=size, mode="bilinear", align_corners=False)[0, 0].numpy()
+    return result
+
+
+def _require_captum() -> Any:
+    try:
+        import captum.attr
+    except ImportError as error:
+        raise RuntimeError("found no Captum, wanted it for attention: type pip install 'caldrive[explain]'") from error
+    return captum.attr
+
+
+def _batch(network: Network, question: Question, images: Sequence[Image]) -> Tensor:
+    """The images (T, 3, H, W) that the block looks at."""
+    last = len(images) - 1
+    chosen = [images[max(0, last - frames)] for frames in frames_back(network, question.affordance)]
+    return normalise(to_float(np.stack(chosen)))
+
+
+def _outputs(network: Network, question: Question, images: Tensor) -> Tensor:
+    """The outputs (1, K) of a block from the images that it looks at."""
+    back, features = frames_back(network, question.affordance), network.features(images)
+    place = {frames: k for k, frames in enumerate(back)}
+    history = features[[place.get(frames, 0) for frames in reversed(range(back[0] + 1))]]
+    command = torch.tensor([[COMMANDS.index(question.command)]])
+    result: Tensor = network.task_blocks()[question.affordance](history[None], command)
+    return result
+
+
+def _last_convolution(network: Network, stage: int) -> nn.Module:
+    """The last convolution of a stage of the backbone: its map is not halved yet."""
+    convolutions = network.backbone.stages[stage]
+    assert isinstance(convolutions, nn.ModuleList)
+    return convolutions[-1]
+
+
+def _reply(question: Question, output: Tensor) -> Reply:
+    """Outputs (1, K) in words and numbers."""
+    spec = question.spec
+    others = {name: torch.zeros(1, other.outputs) for name, other in BY_NAME.items()}
+    value = float(getattr(decode(others | {spec.name: output}), spec.name) or 0)
+    if not spec.discrete:
+        return Reply(spec.title, None, value, 0)
+    target = 1 if spec.binary else int(output.argmax())
+    if question.label is not None:
+        target = spec.classes.index(question.label)
+    which = "" if spec.binary else f" {spec.classes[target]}"
+    label = f"{spec.title}{which}" if target else f"no {spec.title}"
+    return Reply(label, float(output[0].softmax(0)[target]), value, target)

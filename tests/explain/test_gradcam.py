@@ -1,0 +1,121 @@
+"""Attention: a network that looks at one thing is seen to look there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from caldrive.datatypes import Command, Image
+from caldrive.explain import gradcam
+from caldrive.explain.gradcam import Question, ask, attend, frames_back, upsampled
+from caldrive.perception.inference.predictor import NetworkPerception
+from caldrive.perception.network.config import BlockConfig, NetworkConfig
+from caldrive.perception.network.network import Network
+from tests.perception.data import see
+
+CONFIG = NetworkConfig(
+    width=1 / 8, batch_norm=False, hazard_stop=BlockConfig("gru", 8, 0.0, length=3, dilation=2),
+    relative_angle=BlockConfig("dense", 8, 0.0), center_distance=BlockConfig("tconv", 8, 0.0, length=4),
+)  # fmt: skip
+SIZE = CONFIG.image_size
+
+
+@pytest.fixture(scope="module")
+def network() -> Network:
+    torch.manual_seed(1)
+    return Network(CONFIG).eval()
+
+
+def pictures(n: int, seed: int = 0) -> list[Image]:
+    return list(np.random.default_rng(seed).integers(0, 255, (n, *SIZE, 3), dtype=np.uint8))
+
+
+def test_every_frame_of_the_history_has_a_map(network: Network) -> None:
+    attention = attend(network, Question("hazard_stop"), pictures(5))
+    assert attention.back == frames_back(network, "hazard_stop") == (4, 2, 0)
+    assert [one.shape for one in attention.maps] == [(5, 12)] * 3
+    assert len({one.tobytes() for one in attention.maps}) == 3
+    assert sum(attention.shares) == pytest.approx(1.0)
+    assert [one.shape for one in attend(network, Question("red_light"), pictures(1), layer="fine").maps] == [(11, 25)]
+
+
+def test_what_was_long_ago_counts_for_nothing_where_the_block_sees_one_frame(network: Network) -> None:
+    one, other = pictures(4), pictures(4, seed=1)
+    same_last = [*other[:3], one[3]]
+    question = Question("relative_angle", Command.LEFT)
+    np.testing.assert_array_equal(attend(network, question, one).now, attend(network, question, same_last).now)
+    assert (attend(network, question, one).now != attend(network, question, other).now).any()
+
+
+def test_the_reply_is_what_the_driver_would_be_told(network: Network) -> None:
+    images, perception = pictures(6), NetworkPerception(network, precision="fp32", watchdog=False)
+    for image in images:
+        seen = perception.predict(replace(see(image), command=Command.RIGHT))
+    assert ask(network, Question("hazard_stop"), images).probability == pytest.approx(seen.hazard_stop, abs=1e-5)
+    angle = ask(network, Question("relative_angle", Command.RIGHT), images)
+    assert angle.value == pytest.approx(seen.relative_angle, abs=1e-4)
+    assert angle.probability is None
+    sign = ask(network, Question("speed_sign"), images)
+    assert int(sign.value) == (seen.speed_sign or 0)
+    assert sum(
+        ask(network, Question("speed_sign", label=label), images).probability or 0 for label in (0, 30, 60, 90)
+    ) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_classes_have_no_negative_attention_and_values_have_both_signs(network: Network) -> None:
+    assert attend(network, Question("red_light"), pictures(1)).now.min() >= 0
+    signed = attend(network, Question("center_distance"), pictures(4)).now
+    assert signed.min() < 0 < signed.max()
+
+
+def test_attention_is_where_there_is_something_to_see() -> None:
+    torch.manual_seed(0)
+    network = Network(CONFIG).eval()
+    for convolution in network.backbone.convolutions():
+        assert convolution.bias is not None
+        torch.nn.init.zeros_(convolution.bias)
+    image = np.full((*SIZE, 3), (124, 116, 104), np.uint8)  # the mean, of which nothing is left
+    image[20:30, 150:160] = 255
+    large = upsampled(np.abs(attend(network, Question("relative_angle"), [image]).now), SIZE)
+    assert large[:64, 100:].sum() > 0.7 * large.sum() > 0  # of a place a quarter of whose image is there
+
+
+def test_attention_needs_every_convolution_once(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    passed: list[int] = []
+    convolution = network.backbone.convolutions()[0]
+    hook = convolution.register_forward_hook(lambda module, inputs, output: passed.append(len(inputs[0])))
+    attend(network, Question("hazard_stop"), pictures(5))
+    hook.remove()
+    assert set(passed) == {3}  # all frames together, never one by one
+
+
+@pytest.mark.parametrize(
+    ("question", "sentence"),
+    [
+        (("lights", None), "found affordance 'lights', wanted one of hazard_stop"),
+        (("speed_sign", 50), r"found class 50 of speed sign, wanted one of its classes \(0, 30, 60, 90\)"),
+        (("relative_angle", 1), "none, as it is a number"),
+    ],
+)
+def test_questions_that_cannot_be_end_in_a_sentence(question: tuple[str, int | None], sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        Question(question[0], label=question[1])
+
+
+def test_unknown_layers_and_a_missing_library_are_named(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="found layer 'first', wanted one of coarse, fine"):
+        attend(network, Question("red_light"), pictures(1), layer="first")
+    monkeypatch.setitem(__import__("sys").modules, "captum.attr", None)
+    with pytest.raises(RuntimeError, match=r"found no Captum, wanted it .*pip install 'caldrive\[explain\]'"):
+        attend(network, Question("red_light"), pictures(1))
+
+
+def test_the_newest_of_few_images_comes_last(network: Network) -> None:
+    images: Sequence[Image] = pictures(1)
+    question = Question("hazard_stop")
+    assert ask(network, question, images) == ask(network, question, [images[0]] * 5)
+    assert gradcam.LAYERS["coarse"] == len(network.backbone.stages) - 1
