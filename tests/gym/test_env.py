@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import caldrive.gym
 from caldrive.agents.reinforcement.actions import control_of
-from caldrive.agents.reinforcement.config import CARLA2017, COMMANDS
+from caldrive.agents.reinforcement.config import CARLA2017, N_COMMANDS
 from caldrive.datatypes import CameraConfig, Command, Control, Pose
 from caldrive.gym import DrivingEnv, EnvConfig
 from caldrive.results import InfractionKind
@@ -151,7 +151,8 @@ def test_an_action_beyond_its_bounds_is_cut() -> None:
 def test_the_command_is_seen(monkeypatch: pytest.MonkeyPatch, road: DrivingEnv) -> None:
     monkeypatch.setattr("caldrive.gym.env.make_world", lambda camera: StraightRoad(command=Command.LEFT))
     observation, _ = road.reset(options={"scenario": ROAD})
-    assert COMMANDS[int(np.argmax(observation["command"]))] is Command.LEFT
+    assert tuple(Command)[int(np.argmax(observation["command"]))] is Command.LEFT
+    assert len(observation["command"]) == N_COMMANDS == len(Command)
 
 
 def test_registered_environments_are_made_by_their_ids_and_draw_what_they_see() -> None:

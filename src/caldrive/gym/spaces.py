@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from caldrive.agents.reinforcement.config import CARLA2017, COMMANDS, N_AFFORDANCES, N_CONTINUOUS
+from caldrive.agents.reinforcement.config import CARLA2017, N_AFFORDANCES, N_COMMANDS, N_CONTINUOUS
 from caldrive.agents.reinforcement.inputs import affordance_vector
-from caldrive.datatypes import Observation, Truth
+from caldrive.datatypes import Command, Observation, Truth
 from caldrive.gym.config import EnvConfig
 
 FASTEST = 50.0  # m/s
@@ -34,7 +34,7 @@ def observation_space(config: EnvConfig) -> spaces.Dict:
         {
             config.observation: seen[config.observation],
             "speed": spaces.Box(0.0, FASTEST, (1,), np.float32),
-            "command": spaces.Box(0, 1, (len(COMMANDS),), np.int8),
+            "command": spaces.Box(0, 1, (N_COMMANDS,), np.int8),
         }
     )
 
@@ -45,5 +45,5 @@ def observed(config: EnvConfig, observation: Observation, truth: Truth) -> dict[
     return {
         config.observation: seen,
         "speed": np.array([min(observation.speed, FASTEST)], np.float32),
-        "command": np.array([observation.command is command for command in COMMANDS], np.int8),
+        "command": np.array([observation.command is command for command in Command], np.int8),
     }

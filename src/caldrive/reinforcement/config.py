@@ -8,7 +8,6 @@ from typing import Literal
 
 from caldrive.agents.reinforcement.config import Action, Sees
 from caldrive.checks import MOST_SEED, MOST_WORKERS, Limits, require_limits
-from caldrive.scenarios import require_not_held_out
 
 # What each number may be, from and to; a setting that is not here may be any number.
 LIMITS: Limits = {
@@ -107,8 +106,11 @@ class ReinforcementConfig:
 
     def __post_init__(self) -> None:
         require_limits(vars(self), LIMITS, vars(ReinforcementConfig))
-        for town in self.towns:
-            require_not_held_out(town)
+        if self.towns != ReinforcementConfig.towns:
+            from caldrive.scenarios import require_not_held_out  # loads numpy, for which --help does not wait
+
+            for town in self.towns:
+                require_not_held_out(town)
         if "town02" in self.towns:
             raise ValueError("found town02 to learn from, wanted another, as it only judges: type --towns town01")
         if self.rollout * self.environments % self.batch:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from caldrive.agents.conditional_imitation import learner
 from caldrive.agents.conditional_imitation.checkpoint import load_imitation
 from caldrive.agents.conditional_imitation.labels import corl2017_demonstrations, recorded_demonstrations
 from caldrive.agents.conditional_imitation.learner import train_imitation
@@ -43,7 +44,10 @@ def test_the_labels_are_those_of_the_recording(folders: tuple[Path, Path]) -> No
     np.testing.assert_array_equal(read.images(np.arange(3)), recorded.images(np.arange(3)))
 
 
-def test_hdf5_files_train_the_network(folders: tuple[Path, Path], tmp_path: Path) -> None:
+def test_hdf5_files_train_the_network(
+    folders: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(learner, "RANGE_FRAMES", 8)
     network = replace(SMALL, image_width=200, image_height=88)
     _, info = load_imitation(train_imitation(replace(SHORT, steps=2), folders[1], tmp_path, network))
     assert (info.data["train_frames"], info.data["validation_frames"]) == (600, 200)

@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 import torch
 
+from caldrive.agents.conditional_imitation import learner
 from caldrive.agents.conditional_imitation.checkpoint import load_imitation
 from caldrive.agents.conditional_imitation.config import ImitationWeights
 from caldrive.agents.conditional_imitation.learner import imitation_loss, train_imitation
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
 from caldrive.perception.network.checkpoint import CheckpointError
+from caldrive.perception.training import folder as folder_of_training
 from tests.agents.conditional_imitation.data import SHORT, SMALL
 from tests.perception.data import record
 
@@ -24,8 +26,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _one_thread() -> None:
+def _one_thread_and_no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of a tiny training's time would go into its curves, and into the ranges of its integers."""
     torch.set_num_threads(1)
+    monkeypatch.setattr(folder_of_training, "draw_curves", lambda rows, figures, path: path.write_bytes(b"curves"))
+    monkeypatch.setattr(learner, "RANGE_FRAMES", 8)
 
 
 def test_each_error_counts_what_its_weight_says() -> None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from caldrive.datatypes import Command
-
 Sees = Literal["frames", "features", "affordances"]
 Action = Literal["continuous", "carla2017"]
 
-COMMANDS = tuple(Command)
+N_COMMANDS = 3
 SIGNS = (None, 30, 60, 90)  # km/h
 N_AFFORDANCES = 5 + len(SIGNS)  # numbers that say them
 FRAME, N_FRAMES = 84, 2  # pixels a side of the paper's grey frames, and how many there are
@@ -41,7 +39,7 @@ class PolicyConfig:
     def n_numbers(self) -> int:
         """How many numbers it is given: what it sees, its speed, its last decision and the command."""
         seen = {"frames": 0, "features": self.n_features, "affordances": N_AFFORDANCES}
-        return seen[self.sees] + 1 + N_CONTINUOUS * self.memory + len(COMMANDS)
+        return seen[self.sees] + 1 + N_CONTINUOUS * self.memory + N_COMMANDS
 
     @property
     def n_outputs(self) -> int:

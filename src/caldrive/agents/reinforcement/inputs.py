@@ -9,12 +9,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.agents.reinforcement.config import COMMANDS, FRAME, SIGNS
+from caldrive.agents.reinforcement.config import FRAME, SIGNS
 from caldrive.compiled import Floats
 from caldrive.datatypes import (
     MAX_CENTER_DISTANCE,
     MAX_VEHICLE_DISTANCE,
     Affordances,
+    Command,
     Control,
     Image,
     Observation,
@@ -126,7 +127,7 @@ class PolicyInputs:
         """The inputs for a decision: what the eye sees, then speed, the last control and the command."""
         seen = self.eye.see(observation)
         last = (self._last.throttle - self._last.brake, self._last.steer) if self._memory else ()
-        command = (float(observation.command is command) for command in COMMANDS)
+        command = (float(observation.command is command) for command in Command)
         own = np.array((observation.speed / USUAL_SPEED, *last, *command), np.float32)
         return seen | {"numbers": np.concatenate((seen["numbers"], own))}
 
