@@ -7,8 +7,8 @@ columns mean, by the README and the issues of carla-simulator/imitation-learning
 * Steer is + to the right, as in CARLA; ours is + to the left.
 * Steer, gas and brake are what the driver wanted. Every public reader learns from these three.
 * The columns called noise are the same three after the perturbation: what moved the car. The README leaves open whether
-  they are that or the difference. Its author's viewer calls the first one the noisy steer, and the row that issue 13
-  prints has the same 0.6457 for gas and gas noise.
+  they are that or the difference. A public viewer of these files calls the first one the noisy steer, and the row that
+  issue 13 prints has the same 0.6457 for gas and gas noise.
 * Speed is in km/h (issue 40), and negative here and there, which nobody explains (issue 44).
 * Commands: 2 follow the lane, 3 left, 4 right, 5 straight. A few frames have 0, which nobody explains, either.
 * The camera's yaw is in degrees, + to the right: the author's later recordings have +30 for the right camera, and his
