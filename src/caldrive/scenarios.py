@@ -12,6 +12,7 @@ from caldrive.files import as_type
 
 MOST_SEED = 2**53  # that JSON keeps exactly, as a number in 64 bits
 TOWNS = ("town01", "town02")  # in the package; others are generated, or OpenDRIVE files
+JUDGING_TOWN = "town02"
 GENERATED = ("random", "random-wide")  # kinds of generated towns; random:7 is one
 HELD_OUT_FROM = 9_000_000  # seeds of generated towns that only judge: nothing is recorded, tuned or chosen there
 WEATHERS = range(1, 15)  # CARLA's
@@ -44,6 +45,14 @@ def generated_town(town: str) -> GeneratedTown | None:
     if re.fullmatch(r"0|[1-9][0-9]{0,9}", seed, re.ASCII) is None:  # each town has one name
         raise ValueError(f"found town {town!r}, wanted a seed from 0 to 9999999999: type --town {kind}:7")
     return GeneratedTown(kind, int(seed))
+
+
+def require_to_learn_from(town: str) -> None:
+    """Raises ValueError for a town that is there to judge only: nothing learns from it, though it may be recorded to
+    measure what has learnt."""
+    if town == JUDGING_TOWN:
+        raise ValueError(f"found {town} to learn from, wanted another, as that town only judges: take {TOWNS[0]}")
+    require_not_held_out(town)
 
 
 def require_not_held_out(town: str) -> None:

@@ -59,6 +59,13 @@ def test_pictures_of_ones_own_are_filmed(tmp_path: Path) -> None:
     assert answer["frames"] == 2
 
 
+def test_rows_that_a_picture_does_not_have_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "low.png"
+    Picture.fromarray(pictures(1)[0]).save(path)
+    refused = run_json("explain", "pictures", str(path), "--crop", "88:400", "--out", str(tmp_path / "x.mp4"), code=2)
+    assert "found --crop 88:400 where low.png has 88 rows" in refused["error"]
+
+
 def test_attention_is_drawn_while_a_car_drives(monkeypatch: pytest.MonkeyPatch) -> None:
     torch.manual_seed(1)
     network = Network(CONFIG).eval()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from caldrive.agents.settings import AgentSettings
@@ -37,12 +37,11 @@ class BenchmarkSettings(AgentSettings):
     @property
     def driver(self) -> AgentSettings:
         """Who drives, the same for processes that stand in other folders."""
-        return AgentSettings(
+        own = {field.name: getattr(self, field.name) for field in fields(AgentSettings)}
+        return replace(
+            AgentSettings(**own),
             agent=full_name(self.agent),
             model=self.model.resolve() if self.model else None,
             controller=full_name(self.controller),
             cap=None if self.signs else self.cap,
-            blind=self.blind,
-            truth=self.truth,
-            variant=self.variant,
         )

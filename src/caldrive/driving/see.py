@@ -121,11 +121,10 @@ class Viewer:
     def look(self, picture: SourcePicture, label: str) -> SeenPicture:
         """What the network sees in a picture, which comes after those before. Raises ValueError where the crop lies
         outside it."""
-        rows = self._rows(picture)
+        rows = kept_rows(picture, self.crop)
         kept = picture.image[slice(*rows)]
         self.notes = self.notes or self._shape_notes(picture.image.shape[0], kept)
-        # Each pixel is the mean of what lies in it, as in the camera that the network learnt with.
-        network_image = np.array(Picture.fromarray(kept).resize(self.size, Picture.Resampling.BOX))
+        network_image = at_size(kept, self.size)
         affordances, note = self._predict(Observation(picture.time, network_image, speed=0.0, command=self.command))
         return SeenPicture(label, picture.time, picture.image, rows, network_image, affordances, note)
 
@@ -135,18 +134,6 @@ class Viewer:
             return self.perception.predict(observation), ""
         except BadImage as error:
             return None, str(error).partition(":")[0]
-
-    def _rows(self, picture: SourcePicture) -> tuple[int, int]:
-        height = picture.image.shape[0]
-        if self.crop is None:
-            return 0, height
-        if self.crop[1] > height:
-            which = picture.file or f"picture {picture.number}"
-            raise ValueError(
-                f"found --crop {self.crop[0]}:{self.crop[1]} where {which} has {height} rows, wanted rows within it: "
-                f"type --crop {height // 5}:{height * 4 // 5}"
-            )
-        return self.crop
 
     def _shape_notes(self, height: int, kept: Image) -> tuple[str, ...]:
         """Says so where pictures have quite another shape than the network's image."""
@@ -158,6 +145,26 @@ class Viewer:
         text = f"{width} x {rows} pixels are squeezed into the network's {self.size[0]} x {self.size[1]}, another shape"
         advice = f": type --crop {first}:{first + fitting}, or rows like these" if fitting < height else ""
         return (text + advice,)
+
+
+def kept_rows(picture: SourcePicture, crop: tuple[int, int] | None) -> tuple[int, int]:
+    """The first row of a picture to keep and the one after the last. Raises ValueError where the crop lies outside."""
+    height = picture.image.shape[0]
+    if crop is None:
+        return 0, height
+    if crop[1] > height:
+        which = picture.file or f"picture {picture.number}"
+        raise ValueError(
+            f"found --crop {crop[0]}:{crop[1]} where {which} has {height} rows, wanted rows within it: "
+            f"type --crop {height // 5}:{height * 4 // 5}"
+        )
+    return crop
+
+
+def at_size(image: Image, size: tuple[int, int]) -> Image:
+    """An image in a size (width, height). Each pixel is the mean of what lies in it, as in the camera that the network
+    learnt with."""
+    return np.array(Picture.fromarray(image).resize(size, Picture.Resampling.BOX))
 
 
 def parse_crop(text: str) -> tuple[int, int]:

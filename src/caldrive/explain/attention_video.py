@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from PIL import Image as Picture
 
 from caldrive.agents.rows import model_path
 from caldrive.checks import require_within, require_writable_file
@@ -19,7 +18,7 @@ from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.pictures import open_source
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import rollout
-from caldrive.driving.see import parse_crop
+from caldrive.driving.see import at_size, kept_rows, parse_crop
 from caldrive.driving.settings import EpisodeSettings, SeeSettings
 from caldrive.driving.setup import set_up
 from caldrive.explain.gradcam import Attention, Question, attend
@@ -96,11 +95,12 @@ def _driven(settings: EpisodeSettings) -> Iterator[Scene]:
 def _pictures(settings: SeeSettings, size: tuple[int, int]) -> Iterator[Scene]:
     """A person's own pictures in the network's size (height, width)."""
     source, command = open_source(settings.source, settings.every), Command(settings.command)
-    first, end = (None, None) if settings.crop is None else parse_crop(settings.crop)
+    crop = None if settings.crop is None else parse_crop(settings.crop)
     for picture in source:
-        kept = Picture.fromarray(picture.image[first:end])
-        image = np.array(kept.resize((size[1], size[0]), Picture.Resampling.BOX))
-        yield Scene(image, command, min(1.0, picture.number / source.count) if source.count else 0.0)
+        kept = picture.image[slice(*kept_rows(picture, crop))]
+        yield Scene(
+            at_size(kept, (size[1], size[0])), command, min(1.0, picture.number / source.count) if source.count else 0.0
+        )
 
 
 def _write(

@@ -110,11 +110,11 @@ def _require_same(folder: RunFolder) -> None:
 def _settings(folder: RunFolder, way: Telling, out: Path, *, workers: int, ray: str | None) -> BenchmarkSettings:
     """How the failures are driven in one way. Who was blind to an affordance sees it once it is told."""
     driver = folder.driver
-    blind = tuple(name for name in driver.blind if name not in way.truth)
+    truth = tuple(dict.fromkeys((*driver.truth, *way.truth)))
+    senses = {"truth": truth, "blind": tuple(name for name in driver.blind if name not in truth)}
     return BenchmarkSettings(
-        agent=driver.agent, model=driver.model, controller=driver.controller, variant=driver.variant, blind=blind,
-        truth=way.truth, cap=driver.cap, signs=driver.cap is None, suite=str(out / SUITE), out=out / way.name,
-        workers=workers, ray=ray,
+        **vars(driver) | senses, signs=driver.cap is None, suite=str(out / SUITE), out=out / way.name, workers=workers,
+        ray=ray,
     )  # fmt: skip
 
 

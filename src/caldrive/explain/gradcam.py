@@ -108,7 +108,9 @@ def attend(network: Network, question: Question, images: Sequence[Image], layer:
     captum = _require_captum()
     if layer not in LAYERS:
         raise ValueError(f"found layer {layer!r}, wanted one of {', '.join(LAYERS)}: type --layer coarse")
-    reply, batch = ask(network, question, images), _batch(network, question, images)
+    batch = _batch(network, question, images)
+    with torch.no_grad():
+        reply = _reply(question, _outputs(network, question, batch))
     gradcam = captum.LayerGradCam(partial(_outputs, network, question), _last_convolution(network, LAYERS[layer]))
     maps = gradcam.attribute(batch, reply.target, relu_attributions=question.spec.discrete)
     arrays = maps.detach()[:, 0].numpy().astype(np.float32)

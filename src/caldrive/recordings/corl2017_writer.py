@@ -39,7 +39,7 @@ from caldrive.recordings.corl2017 import (
 from caldrive.recordings.folder import duplicates, episode_paths, joined, split
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError
-from caldrive.scenarios import require_not_held_out
+from caldrive.scenarios import require_to_learn_from
 
 FOLLOW_DISTANCE = 20.0  # m before a junction at which the command to follow the lane ends: our choice
 CENTER, LEFT, RIGHT = 0, 1, 2  # cameras' numbers
@@ -144,7 +144,7 @@ def _parts(recording: Path, validation_share: float, seed: int, progress: Progre
     if sentences := duplicates(episodes):
         raise EpisodeError(sentences[0])
     for town in {episode.scenario.town for episode in episodes}:
-        require_not_held_out(town)
+        require_to_learn_from(town)
     parts = dict(zip(FOLDERS, split(episodes, validation_share, seed), strict=True))
     for name, part in parts.items():
         _require_frames(recording, name, part)

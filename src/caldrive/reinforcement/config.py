@@ -107,12 +107,10 @@ class ReinforcementConfig:
     def __post_init__(self) -> None:
         require_limits(vars(self), LIMITS, vars(ReinforcementConfig))
         if self.towns != ReinforcementConfig.towns:
-            from caldrive.scenarios import require_not_held_out  # loads numpy, for which --help does not wait
+            from caldrive.scenarios import require_to_learn_from  # loads numpy, for which --help does not wait
 
             for town in self.towns:
-                require_not_held_out(town)
-        if "town02" in self.towns:
-            raise ValueError("found town02 to learn from, wanted another, as it only judges: type --towns town01")
+                require_to_learn_from(town)
         if self.rollout * self.environments % self.batch:
             raise ValueError(
                 f"found updates of {self.rollout * self.environments} decisions, wanted a multiple of the batch of "

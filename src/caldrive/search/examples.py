@@ -28,11 +28,10 @@ from caldrive.provenance import file_digest
 from caldrive.recordings.folder import find_episodes, held_out, split
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError
-from caldrive.scenarios import require_not_held_out
+from caldrive.scenarios import require_to_learn_from
 from caldrive.search.config import SearchConfig
 
 HISTORY = 60  # frames at an episode's beginning that are history only, for all blocks; the longest looks at 58
-EVALUATION_TOWN = "town02"
 PARTS = ("training", "validation")
 
 
@@ -81,11 +80,7 @@ def split_episodes(source: Source, *, images: bool) -> tuple[list[Episode], list
     folder does not have the episodes that the network's training held out."""
     episodes = find_episodes(source.data, images=images)
     for town in {episode.scenario.town for episode in episodes}:
-        require_not_held_out(town)
-        if town == EVALUATION_TOWN:
-            raise EpisodeError(
-                f"found episodes of {town} in {source.data}, wanted none, as that town only judges: give another --data"
-            )
+        require_to_learn_from(town)
     if source.validation_share:
         return split(episodes, source.validation_share, source.seed)
     keys = read_info(source.model).data.get("validation_episodes", [])

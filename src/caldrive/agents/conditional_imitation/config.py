@@ -14,7 +14,7 @@ from typing import Literal
 from caldrive.checks import MOST_PIXELS, require_limits, require_within
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
 from caldrive.perception.network.config import CELL, MOST_NODES
-from caldrive.perception.training.config import LoopConfig, usual
+from caldrive.perception.training.config import LoopConfig
 
 SMALLEST_SIDE = {"published": 77, "cal": CELL}  # pixels; of a smaller image the convolutions leave nothing
 
@@ -116,4 +116,3 @@ IMITATION_NETWORKS = {
     "published": ImitationNetworkConfig(),
     "cal-backbone": ImitationNetworkConfig(backbone="cal"),
 }
-assert usual(IMITATION_TRAININGS["published"])["steps"] == LoopConfig.steps  # as many images as CAL's network sees

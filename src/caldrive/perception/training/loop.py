@@ -19,7 +19,7 @@ from caldrive.perception.training.resume import restore_state, save_state
 from caldrive.perception.training.run import Learner, TrainingRun
 from caldrive.progress import Progress
 from caldrive.recordings.folder import find_episodes, split
-from caldrive.scenarios import require_not_held_out
+from caldrive.scenarios import require_to_learn_from
 
 Stop = Callable[[int], bool]
 
@@ -44,7 +44,7 @@ def read_frames(
     validate keep their semantic images. Raises ValueError for a town that may only judge."""
     episodes = find_episodes(data, semantic=config.wants_semantics)
     for town in {episode.scenario.town for episode in episodes}:
-        require_not_held_out(town)
+        require_to_learn_from(town)
     training, validation = split(episodes, config.validation_share, config.seed)
     if not semantic_validation:
         validation = [replace(episode, semantics=None) for episode in validation]
