@@ -11,8 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import caldrive.gym
-from caldrive.agents.reinforcement.actions import control_of
-from caldrive.agents.reinforcement.config import CARLA2017, N_COMMANDS
+from caldrive.agents.reinforcement.config import CARLA2017, N_COMMANDS, control_of
 from caldrive.datatypes import CameraConfig, Command, Control, Pose
 from caldrive.gym import DrivingEnv, EnvConfig
 from caldrive.results import InfractionKind

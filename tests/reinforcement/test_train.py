@@ -14,10 +14,12 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
+from caldrive.agents.modular_pipeline.checkpoint import SegmentationInfo, save_segmentation
+from caldrive.agents.modular_pipeline.config import SegmentationConfig
+from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
 from caldrive.agents.reinforcement.checkpoint import load_policy
 from caldrive.agents.reinforcement.encoder import Encoder
 from caldrive.files import locked_folder
-from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.checkpoint import UNFINISHED, CheckpointError, read_header, write_tensors
 from caldrive.reinforcement.config import REINFORCEMENTS, ReinforcementConfig
 from caldrive.reinforcement.train import draw_curves, train_rl
@@ -107,17 +109,15 @@ def test_a_preset_learns(tmp_path: Path, preset: str) -> None:
 
 def test_a_policy_learns_on_the_features_of_a_frozen_encoder(tmp_path: Path) -> None:
     torch.manual_seed(0)
-    backbone = Backbone(0.05, batch_norm=True)
-    tensors = {f"backbone.{name}": value for name, value in backbone.state_dict().items()}
-    network = {"width": 0.05, "image_width": 64, "image_height": 64}
-    path = tmp_path / "mp.safetensors"
-    write_tensors(path, tensors, {"kind": "mp", "config": network, "ranges": []})
+    segmentation = SegmentationConfig(image_width=64, image_height=64, width=0.05)
+    network, path = SegmentationNetwork(segmentation), tmp_path / "mp.safetensors"
+    save_segmentation(path, network, SegmentationInfo(segmentation))
     config = replace(SHORT, steps=32, sees="features", encoder=path)
     _, info, encoder = load_policy(train_rl(config, tmp_path / "out"))
-    assert info.policy.n_features == Encoder(backbone, (64, 64)).n_features
+    assert info.policy.n_features == Encoder(network.backbone, (64, 64)).n_features
     assert info.training["encoder"] == "mp.safetensors"
     assert encoder is not None
-    pairs = zip(encoder.backbone.parameters(), backbone.parameters(), strict=True)
+    pairs = zip(encoder.backbone.parameters(), network.backbone.parameters(), strict=True)
     assert all((after.half() == before.half()).all() for after, before in pairs)
 
 

@@ -214,6 +214,7 @@ class Evaluate(Output):
         if self.held_out:
             episodes = held_out(episodes, info.data.get("validation_episodes", []))
         frames = Frames(episodes, network.config.image_size)
-        evaluation = report(network, frames, backbone_engine(precision, network, info.ranges), self.worst, progress)
+        engine = backbone_engine(precision, network.backbone, network.config.image_size, info.ranges)
+        evaluation = report(network, frames, engine, self.worst, progress)
         values = asdict(evaluation) | {"paper": published_metrics(), "precision": precision}
         return Answer(values, evaluation_table(evaluation, precision))

@@ -25,8 +25,7 @@ except ModuleNotFoundError as error:
     raise ModuleNotFoundError("found no stable-baselines3, wanted it: type pip install 'caldrive[rl]'") from error
 
 from caldrive.agents.reinforcement.config import PolicyConfig
-from caldrive.reinforcement.config import ReinforcementConfig
-from caldrive.reinforcement.curriculum import Curriculum
+from caldrive.reinforcement.config import Curriculum, ReinforcementConfig
 from caldrive.reinforcement.policy import LearningPolicy
 
 Row = dict[str, int | float]  # an update's metrics

@@ -13,12 +13,12 @@ from torch import Tensor
 from caldrive.agents.rows import model_path
 from caldrive.files import as_type, read_json
 from caldrive.perception.network.checkpoint import CheckpointError, read_tensors, write_tensors
+from caldrive.perception.training.resume import restore_run, run_tensors
 from caldrive.provenance import file_digest
 from caldrive.reinforcement.config import ReinforcementConfig
 from caldrive.reinforcement.run import LearningRun
 
 KIND = "reinforcement training"
-POLICY, OPTIMIZER = "policy.", "optimizer."  # what the tensors' names begin with
 FREE = ("checkpoints", "device", "processes", "perception", "encoder")  # of the settings; files count by their digests
 
 
@@ -39,9 +39,7 @@ class Header(TypedDict):
 def save_state(path: Path, run: LearningRun) -> None:
     """Write a run as it is at a save point."""
     policy = run.learning_policy
-    tensors = {POLICY + name: value for name, value in policy.state_dict().items()}
-    for number, moments in policy.optimizer.state_dict()["state"].items():
-        tensors |= {f"{OPTIMIZER}{number}.{name}": value for name, value in moments.items()}
+    tensors = run_tensors(policy, policy.optimizer)
     scale = run.env.ret_rms
     header: Header = {
         "update": run.update, "training": plain_settings(run.config), "files": digests(run.config),
@@ -103,20 +101,9 @@ def _restore(run: LearningRun, tensors: dict[str, Tensor], header: Header) -> No
     if not 0 <= header["level"] < len(run.config.tasks):
         raise ValueError(f"task {header['level']} of {len(run.config.tasks)}")
     policy = run.learning_policy
-    policy.load_state_dict(_without_prefix(POLICY, tensors))
-    moments: dict[int, dict[str, Tensor]] = {}  # of each parameter
-    for path, value in _without_prefix(OPTIMIZER, tensors).items():
-        number, name = path.split(".")
-        moments.setdefault(int(number), {})[name] = value
-    groups = policy.optimizer.state_dict()["param_groups"]
-    policy.optimizer.load_state_dict({"state": moments, "param_groups": groups})
+    restore_run(tensors, policy, policy.optimizer, has_learnt=header["update"] > 0)
     run.update = header["update"]
     run.curriculum.level, run.curriculum.recent = header["level"], header["recent"]
     scale = run.env.ret_rms
     scale.mean, scale.var = np.array(header["mean"]), np.array(header["variance"])
     scale.count = header["count"]
-
-
-def _without_prefix(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Those whose names begin with a prefix, without it."""
-    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}

@@ -113,7 +113,7 @@ def test_integers_say_what_whole_numbers_say(backbone: Literal["published", "cal
     network = ImitationNetwork(ImitationNetworkConfig(backbone=backbone)).eval()
     image = np.random.default_rng(0).integers(0, 255, (88, 200, 3), dtype=np.uint8)
     with torch.inference_mode():
-        ranges = input_ranges(network.trunk, network.normalised(to_float(image[None])))
+        ranges = input_ranges(network.trunk, network.prepared(to_float(image[None])))
     precisions = ("fp32", "int8" if has_vnni() else "int7")  # 8 bits overflow without VNNI
     whole, integers = (image_engine(network, precision, ranges, threads=1)(image) for precision in precisions)
     assert float((whole - integers).abs().mean()) < 0.1 * float(whole.abs().mean())

@@ -14,9 +14,8 @@ import torch
 from caldrive.agents.modular_pipeline.agent import CRUISE, ModularPipelineAgent, auxiliary_camera
 from caldrive.agents.modular_pipeline.checkpoint import SegmentationInfo, save_segmentation
 from caldrive.agents.modular_pipeline.config import SegmentationConfig
-from caldrive.agents.modular_pipeline.odometry import WHEELBASE, motion, wheel_angle
 from caldrive.agents.modular_pipeline.planner import State
-from caldrive.agents.modular_pipeline.pursuit import PursuitState, pursue
+from caldrive.agents.modular_pipeline.pursuit import CAR, PursuitState, motion, pursue, wheel_angle
 from caldrive.agents.modular_pipeline.scene import SceneClass
 from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
 from caldrive.agents.registry import agent_entry, provenance
@@ -55,7 +54,7 @@ def test_odometry_knows_what_the_ego_does() -> None:
         pose = moved(pose, step.x, step.y, step.heading)
     assert math.hypot(pose.x - state.pose.x, pose.y - state.pose.y) < 0.3
     assert pose.heading == pytest.approx(state.pose.heading, abs=0.05)
-    assert VehicleConfig().wheelbase == WHEELBASE
+    assert VehicleConfig().wheelbase == CAR.wheelbase
 
 
 @pytest.mark.parametrize(("y", "sign"), [(2.0, 1), (-2.0, -1)])

@@ -12,12 +12,11 @@ from caldrive.agents.modular_pipeline.checkpoint import (
     SegmentationInfo,
     load_segmentation,
     read_segmentation_info,
-    round_weights,
     save_segmentation,
 )
 from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
 from caldrive.agents.rows import SHIPPED_MODEL
-from caldrive.perception.network.checkpoint import CheckpointError, load_network
+from caldrive.perception.network.checkpoint import CheckpointError, load_network, round_to_half
 from tests.agents.modular_pipeline.test_segmenter import SMALL
 
 INFO = SegmentationInfo(SMALL, {"train_frames": 3}, {"iou/road": 0.5}, {"steps": 7}, (1.0,) * 13)
@@ -35,7 +34,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_a_network_comes_back_as_it_was_measured(network: SegmentationNetwork, path: Path) -> None:
-    round_weights(network)
+    round_to_half(network)
     save_segmentation(path, network, INFO)
     loaded, info = load_segmentation(path)
     assert info == INFO == read_segmentation_info(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from caldrive.agents.modular_pipeline.hazard import BUMPER, THRESHOLD, corridor, moving_area, stopping_distance
+from caldrive.agents.modular_pipeline.agent import BUMPER, THRESHOLD, corridor, moving_area, stopping_distance
 from tests.agents.modular_pipeline.grids import STREET, ground
 
 STRAIGHT = np.stack((np.arange(1.0, 16.0, 0.5), np.zeros(30)), axis=1)

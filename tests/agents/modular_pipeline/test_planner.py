@@ -15,10 +15,11 @@ from caldrive.agents.modular_pipeline.planner import (
     Plan,
     State,
     plan,
+    smooth_into,
 )
+from caldrive.agents.modular_pipeline.pursuit import waypoint_ahead
 from caldrive.agents.modular_pipeline.road_edge import Edge
 from caldrive.agents.modular_pipeline.scene import JUNCTION_AHEAD
-from caldrive.agents.modular_pipeline.waypoints import smooth_into, waypoint_ahead
 from caldrive.datatypes import Command, Pose
 from caldrive.geometry import moved, to_local
 from tests.agents.modular_pipeline.grids import STREET, ground

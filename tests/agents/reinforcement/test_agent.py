@@ -11,6 +11,9 @@ import pytest
 import torch
 
 from caldrive.agents.cal import OraclePerception
+from caldrive.agents.modular_pipeline.checkpoint import SegmentationInfo, save_segmentation
+from caldrive.agents.modular_pipeline.config import SegmentationConfig
+from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
 from caldrive.agents.registry import agent_entry
 from caldrive.agents.reinforcement.agent import ReinforcementAgent, load_agent
 from caldrive.agents.reinforcement.checkpoint import PolicyInfo, encoder_info, load_policy, save_policy
@@ -24,7 +27,7 @@ from caldrive.datatypes import Affordances, CameraConfig, Command, Control, Obse
 from caldrive.driving.setup import set_up
 from caldrive.interfaces import BadImage
 from caldrive.perception.network.backbone import Backbone
-from caldrive.perception.network.checkpoint import CheckpointError, write_tensors
+from caldrive.perception.network.checkpoint import CheckpointError, round_to_half
 from caldrive.scenarios import Scenario
 from tests.fakes import StraightRoad
 
@@ -135,16 +138,14 @@ def test_a_policy_and_its_encoder_come_back_from_their_file(tmp_path: Path) -> N
 
 
 def test_an_encoder_is_read_from_the_modular_pipelines_file(tmp_path: Path) -> None:
-    encoder = small_encoder()
-    tensors = {f"backbone.{name}": value for name, value in encoder.backbone.state_dict().items()}
-    config = {"width": 0.05, "image_width": 64, "image_height": 64}
-    path = tmp_path / "mp.safetensors"
-    write_tensors(path, tensors, {"kind": "mp", "config": config, "ranges": []})
-    images = torch.rand(1, 3, 64, 64)
-    assert torch.equal(load_encoder(path).backbone.eval()(images), encoder.backbone(images))
-    write_tensors(path, tensors, {"kind": "mp", "config": config | {"width": 0.1}, "ranges": []})
-    with pytest.raises(CheckpointError, match="no backbone that can be read"):
-        load_encoder(path)
+    config = SegmentationConfig(image_width=64, image_height=64, width=0.05)
+    network, path = SegmentationNetwork(config).eval(), tmp_path / "mp.safetensors"
+    round_to_half(network)
+    save_segmentation(path, network, SegmentationInfo(config))
+    encoder, images = load_encoder(path), torch.rand(1, 3, 64, 64)
+    assert encoder.image_size == (64, 64)
+    with torch.inference_mode():
+        assert torch.equal(encoder.backbone(images), network.backbone(images))
     with pytest.raises(CheckpointError, match="weights of the agent cal, wanted those of mp"):
         load_encoder(SHIPPED_MODEL)
 

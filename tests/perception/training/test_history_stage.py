@@ -129,7 +129,8 @@ def test_a_kill_after_the_last_step_leaves_no_features(folder: Path, tmp_path: P
 def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: Path) -> None:
     network, info = load_network(train(SHORT, folder, tmp_path, TINY))
     frames = Frames(find_episodes(folder), (HEIGHT, WIDTH))
-    features = history_stage._features(frames, np.arange(len(frames)), backbone_engine("fp32", network, info.ranges))
+    engine = backbone_engine("fp32", network.backbone, network.config.image_size, info.ranges)
+    features = history_stage._features(frames, np.arange(len(frames)), engine)
     with torch.no_grad():
         expected = network.features(normalise(to_float(frames.images(np.arange(3)))))
     assert features.dtype == torch.float16

@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import safe_open
 from torch import Tensor
 
 from caldrive.agents.conditional_imitation.config import ImitationNetworkConfig
 from caldrive.agents.conditional_imitation.network import ImitationNetwork
-from caldrive.files import as_type
 from caldrive.perception.network.checkpoint import (
-    CheckpointError,
     is_weight,
-    read_header,
+    load_state,
+    read_known,
     read_tensors,
-    require_kind,
+    require_shapes,
     write_tensors,
 )
 
@@ -71,37 +69,20 @@ def save_imitation(path: Path, network: ImitationNetwork, info: ImitationInfo) -
 
 def read_imitation_info(path: Path) -> ImitationInfo:
     """What is known of a network; its weights are not read. Raises CheckpointError where it is none of this kind."""
-    header = read_header(path)
-    require_kind(path, header, KIND)
-    try:
-        return as_type({name: header[name] for name in ImitationInfo.__dataclass_fields__}, ImitationInfo)
-    except (KeyError, TypeError, ValueError) as error:
-        raise CheckpointError(
-            f"found in {path} a header that cannot be read ({error}), wanted a training's: train the network again"
-        ) from error
+    return read_known(path, KIND, ImitationInfo)[0]
 
 
 def load_imitation(path: Path) -> tuple[ImitationNetwork, ImitationInfo]:
     """Reads a network, ready to drive, and what is known of it. Raises CheckpointError where it does not fit this code,
     or cannot be what a training leaves."""
     info = read_imitation_info(path)
-    with torch.device("meta"):  # settings may ask for more memory than there is
-        wanted = {name: list(value.shape) for name, value in ImitationNetwork(info.config).state_dict().items()}
-    with safe_open(path, "pt") as file:
-        names = [name for name in file.keys() if not name.endswith(SCALE)]  # noqa: SIM118 (no dictionary)
-        found = {name: file.get_slice(name).get_shape() for name in names}
-    if found != wanted:
-        raise CheckpointError(
-            f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
-        )
+    require_shapes(path, lambda: ImitationNetwork(info.config), lambda name: name.endswith(SCALE), in_bytes=True)
     tensors, _ = read_tensors(path)
     scales = {name: tensors.pop(name) for name in list(tensors) if name.endswith(SCALE)}
     state = {
         name: _from_rows(value, scales[name + SCALE]) if name + SCALE in scales else value
         for name, value in tensors.items()
     }
-    if not all(bool(value.isfinite().all()) for value in state.values()):
-        raise CheckpointError(f"found in {path} weights that are not numbers, wanted a trained network: train it again")
     network = ImitationNetwork(info.config)
-    network.load_state_dict(state)
-    return network.eval(), info
+    load_state(path, network, state)
+    return network, info

@@ -37,7 +37,7 @@ def image_engine(network: ImitationNetwork, precision: str, ranges: Sequence[flo
     @torch.inference_mode()
     def look(image: Image) -> Tensor:
         with autocast(precision, "cpu"):
-            result: Tensor = network.image(network.trunk(network.normalised(to_float(image[None]))))
+            result: Tensor = network.image(network.trunk(network.prepared(to_float(image[None]))))
         return result.float()
 
     return look

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from caldrive.control.lateral import LateralConfig
 from caldrive.perception.dataset.frames import Frames, Ids
+from caldrive.perception.dataset.sampler import weighted
 from caldrive.perception.network.network import COMMANDS
 from caldrive.recordings.corl2017 import DrivenFrames
 
@@ -120,5 +121,5 @@ class CommandSampler:
         drawn = np.empty(n, np.int64)
         for number, (ids, cumulative) in enumerate(zip(self._ids, self._cumulative, strict=True)):
             mine = slice(number, None, len(COMMANDS))
-            drawn[mine] = ids[np.searchsorted(cumulative, chances[mine] * cumulative[-1], side="right")]
+            drawn[mine] = weighted(ids, cumulative, chances[mine])
         return drawn

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,7 @@ from caldrive.perception.network.calibration import input_ranges
 from caldrive.perception.network.network import COMMANDS
 from caldrive.perception.training.distributed import join_process_group
 from caldrive.perception.training.folder import TrainingFolder
-from caldrive.perception.training.loop import Stop, never, read_frames, run_training
+from caldrive.perception.training.loop import Stop, finish_as_it_is, never, read_frames, run_training
 from caldrive.progress import Progress, silent
 from caldrive.recordings.corl2017 import FOLDERS, HEIGHT, WIDTH, read_corl2017
 from caldrive.recordings.folder import episode_paths
@@ -137,7 +136,7 @@ class ImitationLearner:
     def loss(self, step: int, share: slice, forward: nn.Module, generator: Generator) -> Tensor:
         """The loss of a step's frames."""
         ids = self.sampler.draw(step, self.config.batch)[share]
-        images = self._images(ids, generator).to(self.device)
+        images = self.model.prepared(self._images(ids, generator)).to(self.device)
         speed, command, controls = self._targets(self.data.training, ids)
         with autocast(self.config.precision, self.device):
             outputs = forward(images, speed, command)
@@ -174,8 +173,8 @@ class ImitationLearner:
     def _ranges(self, network: ImitationNetwork) -> tuple[float, ...]:
         """The ranges that driving in integers needs."""
         ids = np.unique(self.sampler.draw(0, RANGE_FRAMES))  # of a small recording the same ones come again and again
-        images = to_float(self.data.training.images(ids)).to(self.device)
-        return input_ranges(network.trunk, network.normalised(images))
+        images = network.prepared(to_float(self.data.training.images(ids)))
+        return input_ranges(network.trunk, images.to(self.device))
 
     @torch.inference_mode()
     def _measure(self, network: ImitationNetwork) -> dict[str, float]:
@@ -198,16 +197,13 @@ class ImitationLearner:
         """What a network makes of frames by number."""
         speed, command, _ = self._targets(frames, ids)
         with autocast(self.config.precision, self.device):
-            controls, seen_speed = network(to_float(frames.images(ids)).to(self.device), speed, command)
+            images = network.prepared(to_float(frames.images(ids))).to(self.device)
+            controls, seen_speed = network(images, speed, command)
         return controls.float(), seen_speed.float()
 
     def finish(self, folder: TrainingFolder, progress: Progress) -> None:
         """The network as it is becomes the finished one."""
-        if not folder.has_finished(self.steps):
-            if not folder.unfinished.is_file():
-                self.validate(folder.unfinished)
-            os.replace(folder.unfinished, folder.model)
-        folder.remove_unfinished()
+        finish_as_it_is(self, folder)
 
 
 def start(

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from caldrive.agents.conditional_imitation.config import ImitationNetworkConfig
-from caldrive.perception.images import DEVIATION, MEAN
+from caldrive.perception.images import normalise
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.network import COMMANDS
 
@@ -41,7 +41,7 @@ def _dense(n_in: int, n_out: int, dropout: float) -> list[nn.Module]:
 
 
 class ImitationNetwork(nn.Module):
-    """Images (N, 3, H, W) in [0, 1], speeds (N,) in m/s and the commands' numbers (N,) to controls (N, 3), as named by
+    """Images (N, 3, H, W), by `prepared`, speeds (N,) in m/s and the commands' numbers (N,) to controls (N, 3), see
     `OUTPUTS`, and the speeds (N,) in m/s that the images alone suggest."""
 
     def __init__(self, config: ImitationNetworkConfig) -> None:
@@ -74,12 +74,10 @@ class ImitationNetwork(nn.Module):
             sides = [(side - kernel) // stride + 1 for side in sides]
         return PUBLISHED[-1][2] * sides[0] * sides[1]
 
-    def normalised(self, images: Tensor) -> Tensor:
-        """Images as the convolutions take them: those of CAL with ImageNet's mean 0 and deviation 1."""
-        if self.config.backbone == "published":
-            return images
-        mean, deviation = (images.new_tensor(values)[:, None, None] for values in (MEAN, DEVIATION))
-        return (images - mean) / deviation
+    def prepared(self, images: Tensor) -> Tensor:
+        """Images by `to_float`, in [0, 1] and on the CPU, as the convolutions take them: those of CAL with ImageNet's
+        mean 0 and deviation 1, in place."""
+        return normalise(images) if self.config.backbone == "cal" else images
 
     def _branch(self, nodes: int, n_out: int) -> nn.Sequential:
         layers = _dense(self.config.nodes, nodes, self.config.dropout) + _dense(nodes, nodes, 0.0)
@@ -87,7 +85,7 @@ class ImitationNetwork(nn.Module):
 
     def forward(self, images: Tensor, speed: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
         """As the class says."""
-        return self.act(self.image(self.trunk(self.normalised(images))), speed, command)
+        return self.act(self.image(self.trunk(images)), speed, command)
 
     def act(self, image: Tensor, speed: Tensor, command: Tensor) -> tuple[Tensor, Tensor]:
         """The same from what the image was made into (N, nodes)."""

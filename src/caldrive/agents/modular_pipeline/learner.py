@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Generator, Tensor, nn
 
-from caldrive.agents.modular_pipeline.checkpoint import SegmentationInfo, round_weights, save_segmentation
+from caldrive.agents.modular_pipeline.checkpoint import SegmentationInfo, save_segmentation
 from caldrive.agents.modular_pipeline.config import PipelineConfig, SegmentationConfig
 from caldrive.agents.modular_pipeline.scene import SceneClass
 from caldrive.agents.modular_pipeline.segmentation import (
@@ -26,12 +25,14 @@ from caldrive.agents.modular_pipeline.segmentation import (
 )
 from caldrive.perception.dataset.augmentation import augmented
 from caldrive.perception.dataset.frames import Frames, Ids
+from caldrive.perception.dataset.sampler import weighted
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import autocast
 from caldrive.perception.network.calibration import input_ranges
+from caldrive.perception.network.checkpoint import round_to_half
 from caldrive.perception.training.distributed import join_process_group
 from caldrive.perception.training.folder import TrainingFolder
-from caldrive.perception.training.loop import Stop, never, read_frames, run_training
+from caldrive.perception.training.loop import Stop, finish_as_it_is, never, read_frames, run_training
 from caldrive.progress import Progress, silent
 from caldrive.recordings.folder import episode_paths
 
@@ -73,9 +74,7 @@ class JunctionSampler:
 
     def draw(self, step: int, n: int) -> Ids:
         """n of the frames."""
-        chances = np.random.default_rng((self.seed, step)).random(n) * self.cumulative[-1]
-        drawn: Ids = self.ids[np.searchsorted(self.cumulative, chances, side="right")]
-        return drawn
+        return weighted(self.ids, self.cumulative, np.random.default_rng((self.seed, step)).random(n))
 
 
 def sampler_of(labels: NDArray[np.float64], config: PipelineConfig) -> JunctionSampler:
@@ -132,7 +131,7 @@ class PipelineLearner:
     def validate(self, path: Path) -> dict[str, float]:
         """Writes the network as it is, with its validation's figures, and returns them."""
         network = copy.deepcopy(self.model).eval()
-        round_weights(network)
+        round_to_half(network)
         metrics = self._measure(network)
         data = {
             "train_frames": len(self.sampler.ids), "validation_frames": len(self.validation),
@@ -170,11 +169,7 @@ class PipelineLearner:
 
     def finish(self, folder: TrainingFolder, progress: Progress) -> None:
         """The network as it is becomes the finished one."""
-        if not folder.has_finished(self.steps):
-            if not folder.unfinished.is_file():
-                self.validate(folder.unfinished)
-            os.replace(folder.unfinished, folder.model)
-        folder.remove_unfinished()
+        finish_as_it_is(self, folder)
 
 
 def _semantics(frames: Frames, ids: Ids) -> NDArray[np.uint8]:

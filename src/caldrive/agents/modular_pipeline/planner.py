@@ -15,9 +15,8 @@ import numpy as np
 from caldrive.agents.modular_pipeline.ground import GroundGrid
 from caldrive.agents.modular_pipeline.road_edge import ACROSS, LOST, ROAD, TARGET, Edge, edge_points, fit_edge, opening
 from caldrive.agents.modular_pipeline.scene import JUNCTION_AHEAD
-from caldrive.agents.modular_pipeline.waypoints import SPACING, smooth_into, straight_to
 from caldrive.datatypes import Command, Points, Pose
-from caldrive.geometry import moved, to_local, wrap_angle
+from caldrive.geometry import moved, to_local, to_world, wrap_angle
 
 EDGE_DISTANCE = 2.0  # m from the right edge of the road to the middle of the lane
 USUAL_EDGE = Edge(-EDGE_DISTANCE)  # of a lane, along its middle
@@ -40,6 +39,9 @@ SKEW, MIDDLE = 0.21, 7.0  # rad to the left of the lane, and m in that direction
 EXIT_STATIONS = np.arange(0.0, 9.0, 0.5)  # m along the target lane at which its edge is looked for
 FOUND, IN_VIEW = 4, 8  # points of an edge that keep it in sight, and that make it seen
 REFINED = 1.0  # m before the junction up to which the turn is planned anew
+SPACING = 0.5  # m between two waypoints
+CIRCLE = 1.17  # of the gap, the tangents with which a cubic is a quarter of a circle, nearly
+AFTER = 8.0  # m of the lane that follow a turn
 FINISHED, TURNED = 3.0, 0.35  # m to the target lane, or rad from its heading, at which a turn ends
 
 
@@ -194,4 +196,25 @@ def _turn_waypoints(turn: Turn) -> Points:
     start = turn.start or middle
     legs = [(CAR, turn.entry)] if turn.entry.x > SPACING else []
     legs += [(turn.entry, middle)] if turn.start is None else []
-    return np.concatenate([*(straight_to(*leg) for leg in legs), smooth_into(start, turn.exit)])
+    return np.concatenate([*(_straight_to(*leg) for leg in legs), smooth_into(start, turn.exit)])
+
+
+def smooth_into(start: Pose, lane: Pose, spacing: float = SPACING) -> Points:
+    """Points (N, 2) of a cubic from a pose into a lane (a point on its middle, with its heading), and AFTER m on."""
+    gap = math.hypot(lane.x - start.x, lane.y - start.y)
+    n = max(2, math.ceil(gap / spacing))
+    u = np.linspace(0, 1, n)[:, None]
+    tangent = [CIRCLE * gap * np.array([math.cos(p.heading), math.sin(p.heading)]) for p in (start, lane)]
+    p, q = np.array([start.x, start.y]), np.array([lane.x, lane.y])
+    curve = (
+        (2 * u**3 - 3 * u**2 + 1) * p + (u**3 - 2 * u**2 + u) * tangent[0]
+        + (3 * u**2 - 2 * u**3) * q + (u**3 - u**2) * tangent[1]
+    )  # fmt: skip
+    onward = np.arange(spacing, AFTER, spacing)
+    return np.concatenate((curve, to_world(lane, np.stack((onward, 0 * onward), axis=1))))
+
+
+def _straight_to(start: Pose, end: Pose) -> Points:
+    """Points (N, 2) from one pose to another, without the last."""
+    n = max(1, round(math.hypot(end.x - start.x, end.y - start.y) / SPACING))
+    return np.linspace((start.x, start.y), (end.x, end.y), n, endpoint=False)

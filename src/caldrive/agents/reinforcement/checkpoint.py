@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import torch
-from torch import Tensor, nn
+from torch import nn
 
 from caldrive.agents.reinforcement.config import PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder
 from caldrive.agents.reinforcement.policy import Policy
-from caldrive.files import as_type
 from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.checkpoint import (
     CheckpointError,
     is_weight,
-    read_header,
+    load_state,
+    read_known,
     read_tensors,
-    require_kind,
+    require_shapes,
     single_precision,
     write_tensors,
 )
@@ -67,41 +66,30 @@ def encoder_info(encoder: Encoder) -> EncoderInfo:
 
 def read_policy_info(path: Path) -> PolicyInfo:
     """What is known of a policy; its weights are not read. Raises CheckpointError where the file is none."""
-    header = read_header(path)
-    require_kind(path, header, KIND)
-    try:
-        names = {part.name for part in fields(PolicyInfo)}
-        return as_type({name: header[name] for name in header.keys() & names}, PolicyInfo)
-    except (KeyError, TypeError, ValueError) as error:
-        raise CheckpointError(
-            f"found in {path} a header that cannot be read ({error}), wanted a training's: train the policy again"
-        ) from error
+    return read_known(path, KIND, PolicyInfo)[0]
 
 
 def load_policy(path: Path) -> tuple[Policy, PolicyInfo, Encoder | None]:
     """Read a policy, ready to drive, what is known of it, and its encoder. Raises CheckpointError where the file is no
     policy, or does not fit this code."""
     info = read_policy_info(path)
-    tensors = single_precision(read_tensors(path)[0], camera_check=False)
-    policy, encoder = Policy(info.policy), None
-    _load(path, policy, tensors, POLICY)
-    if info.encoder is not None:
-        known = info.encoder
-        encoder = Encoder(Backbone(known.width, known.batch_norm), known.image_size, known.ranges)
-        _load(path, encoder.backbone, tensors, ENCODER)
-    elif info.policy.sees == "features":
+    if info.encoder is None and info.policy.sees == "features":
         raise CheckpointError(f"found in {path} a policy without its encoder, wanted both: train the policy again")
-    return policy.eval(), info, encoder
+    require_shapes(path, lambda: _build(info))
+    parts = _build(info)
+    load_state(path, parts, single_precision(read_tensors(path)[0], camera_check=False))
+    policy, encoder = parts["policy"], None
+    assert isinstance(policy, Policy)
+    if info.encoder is not None:
+        backbone = parts["encoder"]
+        assert isinstance(backbone, Backbone)
+        encoder = Encoder(backbone, info.encoder.image_size, info.encoder.ranges)
+    return policy, info, encoder
 
 
-def _load(path: Path, module: nn.Module, tensors: dict[str, Tensor], prefix: str) -> None:
-    """Raises CheckpointError where the tensors do not fit a module."""
-    state = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
-    try:
-        module.load_state_dict(state)
-    except RuntimeError as error:
-        raise CheckpointError(
-            f"found in {path} weights that do not fit its own settings, wanted those that do: train the policy again"
-        ) from error
-    if not all(bool(torch.isfinite(value).all()) for value in state.values()):
-        raise CheckpointError(f"found in {path} weights that are not numbers, wanted a trained policy: train it again")
+def _build(info: PolicyInfo) -> nn.ModuleDict:
+    """A policy and its encoder, as `save_policy` names their tensors."""
+    parts: dict[str, nn.Module] = {"policy": Policy(info.policy)}
+    if info.encoder is not None:
+        parts["encoder"] = Backbone(info.encoder.width, info.encoder.batch_norm)
+    return nn.ModuleDict(parts)

@@ -107,8 +107,8 @@ class Convolutions(nn.Module):
             nn.Conv2d(32, 64, 4, 2), nn.LeakyReLU(SLOPE),
             nn.Conv2d(64, 64, 3, 1), nn.LeakyReLU(SLOPE), nn.Flatten(),
         )  # fmt: skip
-        with torch.device("cpu"), torch.no_grad():
-            n_features = int(self.frames.to("cpu")(torch.zeros(1, N_FRAMES, FRAME, FRAME)).shape[1])
+        with torch.no_grad():
+            n_features = int(self.frames(torch.zeros(1, N_FRAMES, FRAME, FRAME)).shape[1])
         self.frames.extend(_layer(n_features, hidden))
         self.numbers = nn.Sequential(*_layer(n_numbers, hidden), *_layer(hidden, hidden))
         self.both = _layer(2 * hidden, hidden)

@@ -34,6 +34,13 @@ def rarity(frames: Frames, balance: float) -> NDArray[np.float64]:
     return (1 / rarest) ** balance * np.where(waiting, WAITING_WEIGHT**balance, 1.0)
 
 
+def weighted(ids: Ids, cumulative: NDArray[np.float64], chances: NDArray[np.float64]) -> Ids:
+    """Of some ids (N,) as many as there are chances (n,) in [0, 1), each as likely as its weight says. cumulative: sums
+    of the weights (N,)."""
+    drawn: Ids = ids[np.searchsorted(cumulative, chances * cumulative[-1], side="right")]
+    return drawn
+
+
 class Sampler:
     """Draws training windows: the rarer the rarest class or command in it, the likelier a window.
 
@@ -57,9 +64,7 @@ class Sampler:
 
     def draw(self, step: int, n: int) -> Ids:
         """First frames of n windows."""
-        chance = np.random.default_rng((self.seed, step)).random(n) * self._cumulative[-1]
-        drawn: Ids = self.starts[np.searchsorted(self._cumulative, chance, side="right")]
-        return drawn
+        return weighted(self.starts, self._cumulative, np.random.default_rng((self.seed, step)).random(n))
 
     def alternatives(self, step: int, n: int, share: float) -> NDArray[np.bool_]:
         """Which of n windows, a share of them, are seen under the alternative command, if one could be given."""

@@ -13,6 +13,7 @@ from caldrive.compiled import Floats
 from caldrive.datatypes import Image
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.compiled_blocks import CompiledBlocks, passes
+from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.camera_check import CameraCheck
 from caldrive.perception.network.network import Network
 
@@ -49,20 +50,19 @@ def autocast(precision: str, device: str) -> AbstractContextManager[Any]:
 
 
 def backbone_engine(
-    precision: str, network: Network, ranges: Sequence[float], threads: int | None = None
+    precision: str, backbone: Backbone, size: tuple[int, int], ranges: Sequence[float], threads: int | None = None
 ) -> BackboneEngine:
-    """The backbone in fp32, bf16, int8 or int7 on the CPU; bf16 turns the network's own. ranges: by
-    `calibration.input_ranges`, which integers need. threads: for integers, as many
-    as torch has without it."""
+    """A backbone in fp32, bf16, int8 or int7 on the CPU, for images of a size (height, width); bf16 turns the backbone
+    itself. ranges: by `calibration.input_ranges`, which integers need. threads: for integers, as many as torch has
+    without it."""
     if precision in INTEGERS:
         from caldrive.perception.inference.openvino_engine import Int8Backbone  # OpenVINO, which only integers need
 
         threads = threads or torch.get_num_threads()
-        size, bits = network.config.image_size, INTEGERS[precision]
-        return Int8Backbone(network.backbone, ranges, size, threads=threads, bits=bits)
+        return Int8Backbone(backbone, ranges, size, threads=threads, bits=INTEGERS[precision])
     dtype = torch.bfloat16 if precision == "bf16" else torch.float32
-    network.backbone.to(dtype)
-    return lambda images: network.features(images.to(dtype)).float()
+    backbone.to(dtype)
+    return lambda images: backbone(images.to(dtype)).float()
 
 
 def eyes_engine(
@@ -75,7 +75,7 @@ def eyes_engine(
         return OpenVINOEyes(
             network, ranges, check, threads=threads or torch.get_num_threads(), bits=INTEGERS[precision]
         )
-    backbone = backbone_engine(precision, network, ranges, threads)
+    backbone = backbone_engine(precision, network.backbone, network.config.image_size, ranges, threads)
 
     @torch.inference_mode()
     def look(image: Image) -> tuple[Floats, Floats | None]:

@@ -22,8 +22,8 @@ import torch
 
 from caldrive.files import read_json, write_whole
 from caldrive.perception.inference.engines import INTEGERS, PRECISIONS, backbone_engine, use_bf16
+from caldrive.perception.network.backbone import Backbone
 from caldrive.perception.network.config import NetworkConfig
-from caldrive.perception.network.network import Network
 from caldrive.user_cache import own_folders
 
 CANDIDATES = ("int7", "fp32", "bf16")  # int8 overflows without VNNI
@@ -77,9 +77,9 @@ def measured() -> dict[str, float]:
     times: dict[str, float] = {}
     with torch.random.fork_rng([]), torch.inference_mode():  # a training may be under way
         for precision in CANDIDATES:
-            network = Network(config).eval()
-            ranges = (4.0,) * len(network.backbone.convolutions())
-            engine = backbone_engine(precision, network, ranges, threads=1)
+            backbone = Backbone(config.width, config.batch_norm).eval()
+            ranges = (4.0,) * len(backbone.convolutions())
+            engine = backbone_engine(precision, backbone, config.image_size, ranges, threads=1)
             times[precision] = _median_ms(partial(engine, images), min(times.values(), default=math.inf))
     return times
 

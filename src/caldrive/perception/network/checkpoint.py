@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, TypedDict, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import load, save
-from torch import Tensor
+from torch import Tensor, nn
 
 from caldrive.affordances import DISCRETE, describe
 from caldrive.files import as_type, read_json, write_whole
@@ -27,6 +27,7 @@ KEY = "caldrive"  # of the JSON in safetensors' metadata
 CAMERA_CHECK = "camera_check."  # what the names of the camera check's tensors begin with
 UNFINISHED = "unfinished.safetensors"  # a network in the folder of a training that goes on
 AGENTS = {"network": "cal", "cil": "cil", "mp": "mp", "rl": "rl"}  # by kind of tensors: who drives by them
+Info = TypeVar("Info")
 FLOATS = ("F64", "F32", "F16", "BF16")  # safetensors' names
 SMALLEST_SPREAD = 1e-12  # of the values of a matrix of weights; the smallest that 16 bits tell apart is 6e-8
 
@@ -130,7 +131,7 @@ def is_weight(value: Tensor) -> bool:
     return value.is_floating_point() and value.dim() > 1
 
 
-def round_to_half(network: Network) -> None:
+def round_to_half(network: nn.Module) -> None:
     """Rounds a network's weights in place to what 16 bits can hold, so that it is measured as it is stored."""
     for value in network.state_dict().values():
         if is_weight(value):
@@ -148,16 +149,22 @@ def save_network(path: Path | str, network: Network, info: CheckpointInfo, half:
 def read_info(path: Path | str) -> CheckpointInfo:
     """What is known of a network; its weights are not read. Raises CheckpointError where it is none of this code's
     kind."""
-    path = Path(path)
-    header = read_header(path)
-    require_kind(path, header, "network")
+    info, header = read_known(Path(path), "network", CheckpointInfo)
     if header.get("specs") != describe():
         raise CheckpointError(
             f"found in {path} a network for other affordances, wanted those of this caldrive: train the network again"
         )
+    return info
+
+
+def read_known(path: Path, kind: str, info: type[Info]) -> tuple[Info, dict[str, Any]]:
+    """What a header says of a network of some kind (a key of `AGENTS`), as a dataclass, and the whole header. Raises
+    CheckpointError where the file is of another kind, or its header none of a training's."""
+    header = read_header(path)
+    require_kind(path, header, kind)
+    names = {part.name for part in fields(info)}  # type: ignore[arg-type]
     try:
-        names = {part.name for part in fields(CheckpointInfo)}
-        return as_type({name: header[name] for name in header.keys() & names}, CheckpointInfo)
+        return as_type({name: header[name] for name in header.keys() & names}, info), header
     except (KeyError, TypeError, ValueError) as error:
         raise CheckpointError(
             f"found in {path} a header that cannot be read ({error}), wanted a training's: train the network again"
@@ -169,12 +176,12 @@ def load_network(path: Path | str) -> tuple[Network, CheckpointInfo]:
     code, or cannot be what a training leaves."""
     path = Path(path)
     info = read_info(path)
-    _require_shapes(path, info.config)
+    require_shapes(path, lambda: Network(info.config), is_extra=lambda name: name.startswith(CAMERA_CHECK))
     network = Network(info.config)
-    network.load_state_dict(single_precision(load(path.read_bytes()), camera_check=False))
+    load_state(path, network, single_precision(load(path.read_bytes()), camera_check=False))
     if fault := _fault(network, info):
         raise CheckpointError(f"found in {path} {fault}, wanted a trained network: train it again")
-    return network.eval(), info
+    return network, info
 
 
 def single_precision(tensors: dict[str, Tensor], *, camera_check: bool) -> dict[str, Tensor]:
@@ -187,26 +194,45 @@ def single_precision(tensors: dict[str, Tensor], *, camera_check: bool) -> dict[
     }
 
 
-def _require_shapes(path: Path, config: NetworkConfig) -> None:
-    """Raises CheckpointError where a file's tensors have not the shapes and kinds of its settings. Nothing is
-    allocated: settings may ask for more than there is memory."""
+def require_shapes(
+    path: Path,
+    build: Callable[[], nn.Module],
+    is_extra: Callable[[str], bool] = lambda name: False,
+    *,
+    in_bytes: bool = False,
+) -> None:
+    """Raises CheckpointError where a file's tensors have not the names, shapes and kinds of what its settings build.
+    Nothing is allocated: settings may ask for more memory than there is.
+
+    is_extra: whether a tensor of this name is not the network's own. in_bytes: whether weights are whole numbers.
+    """
     with torch.device("meta"):
-        state = Network(config).state_dict()
+        state = build().state_dict()
     with safe_open(path, "pt") as file:
-        names = [name for name in file.keys() if not name.startswith(CAMERA_CHECK)]  # noqa: SIM118 (no dictionary)
+        names = [name for name in file.keys() if not is_extra(name)]  # noqa: SIM118 (no dictionary)
         slices = {name: file.get_slice(name) for name in names}
         found = {name: (part.get_shape(), part.get_dtype() in FLOATS) for name, part in slices.items()}
-    if found != {name: (list(value.shape), value.is_floating_point()) for name, value in state.items()}:
+    wanted = {
+        name: (list(value.shape), value.is_floating_point() and not (in_bytes and is_weight(value)))
+        for name, value in state.items()
+    }
+    if found != wanted:
         raise CheckpointError(
             f"found in {path} weights that do not fit its own settings, wanted those that do: train the network again"
         )
 
 
+def load_state(path: Path, network: nn.Module, state: dict[str, Tensor]) -> None:
+    """Gives a network its weights, ready for evaluation. Raises CheckpointError where they are not numbers."""
+    if not all(bool(value.isfinite().all()) for value in state.values()):
+        raise CheckpointError(f"found in {path} weights that are not numbers, wanted a trained network: train it again")
+    network.load_state_dict(state)
+    network.eval()
+
+
 def _fault(network: Network, info: CheckpointInfo) -> str:
     """What is not as a training leaves it, or nothing."""
     state = network.state_dict()
-    if not all(bool(value.isfinite().all()) for value in state.values()):
-        return "weights that are not numbers"
     if any(bool((value < 0).any()) for name, value in state.items() if name.endswith("running_var")):
         return "variances less than 0"
     if alike := [name for name, value in state.items() if ".weight" in name and _is_constant(value)]:

@@ -48,7 +48,7 @@ def feature_table(
     round_to_half(network)
     precision = driving_precision("auto", ranges)
     digest = _digest(network.backbone, precision, ranges, frames)
-    engine = backbone_engine(precision, copy.deepcopy(network), ranges)
+    engine = backbone_engine(precision, copy.deepcopy(network.backbone), network.config.image_size, ranges)
     table = torch.empty(len(frames), network.backbone.n_features(*network.config.image_size)).half()
     for number, first in enumerate(range(0, len(frames), FRAMES_A_FILE)):
         path = folder / f"{number:04d}.safetensors"

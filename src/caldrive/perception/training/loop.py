@@ -4,6 +4,7 @@ after a stop."""
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
@@ -105,6 +106,15 @@ def _step(run: TrainingRun, folder: TrainingFolder) -> None:
     if run.group.is_main and (last or run.step % config.save_every == 0):
         folder.write_metrics()
         save_state(folder.state, run)
+
+
+def finish_as_it_is(learner: Learner, folder: TrainingFolder) -> None:
+    """The network as it is becomes the finished one, where there is no second stage."""
+    if not folder.has_finished(learner.config.steps):
+        if not folder.unfinished.is_file():
+            learner.validate(folder.unfinished)
+        os.replace(folder.unfinished, folder.model)
+    folder.remove_unfinished()
 
 
 def add_validation(figures: dict[str, float], folder: TrainingFolder, learner: Learner) -> None:

@@ -8,7 +8,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypedDict
 
-from torch import Tensor
+from torch import Tensor, nn
+from torch.optim import Optimizer
 
 from caldrive.files import as_type
 from caldrive.perception.network.checkpoint import CheckpointError, read_tensors, write_tensors
@@ -34,9 +35,7 @@ class Header(TypedDict):
 
 def save_state(path: Path, run: TrainingRun) -> None:
     """Write a run as it is between two steps."""
-    tensors = {f"{MODEL}{name}": value for name, value in run.learner.model.state_dict().items()}
-    for number, moments in run.optimizer.state_dict()["state"].items():
-        tensors |= {f"{OPTIMIZER}{number}.{name}": value for name, value in moments.items()}
+    tensors = run_tensors(run.learner.model, run.optimizer)
     header: Header = {
         "step": run.step, "network": dict(run.learner.network_settings), "training": asdict(run.config),
         "episodes": run.learner.data_digest, "processes": run.group.size,
@@ -102,22 +101,36 @@ def _flat(settings: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def run_tensors(model: nn.Module, optimizer: Optimizer) -> dict[str, Tensor]:
+    """The tensors of a model and of its optimizer, by names that `restore_run` knows."""
+    tensors = {f"{MODEL}{name}": value for name, value in model.state_dict().items()}
+    for number, moments in optimizer.state_dict()["state"].items():
+        tensors |= {f"{OPTIMIZER}{number}.{name}": value for name, value in moments.items()}
+    return tensors
+
+
+def restore_run(tensors: dict[str, Tensor], model: nn.Module, optimizer: Optimizer, *, has_learnt: bool) -> None:
+    """The inverse of `run_tensors`. has_learnt: whether a step was done. Raises ValueError where Adam's moments are not
+    whole, RuntimeError where the tensors are another model's."""
+    model.load_state_dict(_without_prefix(MODEL, tensors))
+    moments: dict[int, dict[str, Tensor]] = {}  # of each parameter
+    for path, value in _without_prefix(OPTIMIZER, tensors).items():
+        number, name = path.split(".")
+        moments.setdefault(int(number), {})[name] = value
+    whole = all(values.keys() == ADAM for values in moments.values())
+    if not whole or (has_learnt and not moments):
+        raise ValueError("without all of the optimizer's tensors")
+    groups = optimizer.state_dict()["param_groups"]
+    optimizer.load_state_dict({"state": moments, "param_groups": groups})
+
+
 def _without_prefix(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
     """Those whose names begin with a prefix, without it."""
     return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
 
 
 def _restore(run: TrainingRun, tensors: dict[str, Tensor], header: Header) -> None:
-    run.learner.model.load_state_dict(_without_prefix(MODEL, tensors))
+    restore_run(tensors, run.learner.model, run.optimizer, has_learnt=header["step"] > 0)
     began = {name: header["training"][name] for name in ("initial", "imagenet") if name in header["training"]}
     run.learner.config = replace(run.learner.config, **began)  # with what it really began
-    moments: dict[int, dict[str, Tensor]] = {}  # of each parameter
-    for path, value in _without_prefix(OPTIMIZER, tensors).items():
-        number, name = path.split(".")
-        moments.setdefault(int(number), {})[name] = value
-    whole = all(values.keys() == ADAM for values in moments.values())
-    if not whole or (header["step"] and not moments):
-        raise ValueError("without all of the optimizer's tensors")
-    groups = run.optimizer.state_dict()["param_groups"]
-    run.optimizer.load_state_dict({"state": moments, "param_groups": groups})
     run.step = header["step"]

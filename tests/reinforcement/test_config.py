@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from caldrive.reinforcement.curriculum import Curriculum
+from caldrive.reinforcement.config import Curriculum
 
 TASKS = ("straight", "one-turn", "navigation")
 
