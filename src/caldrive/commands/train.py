@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -91,13 +92,8 @@ class TrainImitation(Configurable):
     def run(self, progress: Progress) -> Answer:
         """Trains; answers with the network's file."""
         from caldrive.agents.conditional_imitation.learner import train_imitation
-        from caldrive.checks import require_writable_folder
-        from caldrive.perception.training.distributed import keep_freed_memory
 
-        require_writable_folder(self.out)
-        keep_freed_memory()
-        model = train_imitation(self.training, self.data, self.out, self.network, progress)
-        return Answer({"model": str(model)}, f"trained: caldrive drive --agent cil --model {model}")
+        return _trained(self, lambda: train_imitation(self.training, self.data, self.out, self.network, progress))
 
 
 TrainImitation.PRESETS.update(
@@ -131,13 +127,8 @@ class TrainPipeline(Configurable):
     def run(self, progress: Progress) -> Answer:
         """Trains; answers with the network's file."""
         from caldrive.agents.modular_pipeline.learner import train_pipeline
-        from caldrive.checks import require_writable_folder
-        from caldrive.perception.training.distributed import keep_freed_memory
 
-        require_writable_folder(self.out)
-        keep_freed_memory()
-        model = train_pipeline(self.training, self.data, self.out, self.network, progress)
-        return Answer({"model": str(model)}, f"trained: caldrive drive --agent mp --model {model}")
+        return _trained(self, lambda: train_pipeline(self.training, self.data, self.out, self.network, progress))
 
 
 TrainPipeline.PRESETS.update(
@@ -164,12 +155,9 @@ class TrainReinforcement(Configurable):
 
     def run(self, progress: Progress) -> Answer:
         """Trains; answers with the policy's file."""
-        from caldrive.checks import require_writable_folder
         from caldrive.reinforcement.train import train_rl
 
-        require_writable_folder(self.out)
-        model = train_rl(self.training, self.out, progress)
-        return Answer({"model": str(model)}, f"trained: caldrive drive --agent rl --model {model}")
+        return _trained(self, lambda: train_rl(self.training, self.out, progress))
 
 
 TrainReinforcement.PRESETS.update(
@@ -177,6 +165,17 @@ TrainReinforcement.PRESETS.update(
 )
 Train.BY_AGENT.update(cal=Train, cil=TrainImitation, mp=TrainPipeline, rl=TrainReinforcement)
 Train.PRESETS.update({name: Train(preset=name, training=TRAININGS[name], network=NETWORKS[name]) for name in TRAININGS})
+
+
+def _trained(verb: TrainImitation | TrainPipeline | TrainReinforcement, train: Callable[[], Path]) -> Answer:
+    """The answer of a training, done into a folder that can be written into."""
+    from caldrive.checks import require_writable_folder
+    from caldrive.perception.training.distributed import keep_freed_memory
+
+    require_writable_folder(verb.out)
+    keep_freed_memory()
+    model = train()
+    return Answer({"model": str(model)}, f"trained: caldrive drive --agent {verb.agent} --model {model}")
 
 
 @dataclass(frozen=True, kw_only=True)
