@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from caldrive.agents.modular_pipeline.planner import State
 from caldrive.agents.modular_pipeline.pursuit import CAR, PursuitState, motion, pursue, wheel_angle
 from caldrive.agents.modular_pipeline.scene import SceneClass
 from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
-from caldrive.agents.registry import agent_entry, provenance
+from caldrive.agents.registry import provenance
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import DT, KMH, CameraConfig, Command, Control, Observation, Pose
 from caldrive.driving.rollout import run_episode
@@ -84,22 +83,6 @@ def test_a_cap_is_kept() -> None:
     slow.act(seen(picture()))
     assert slow.decision is not None
     assert slow.decision.target_speed == 10.0
-
-
-def test_an_agent_is_told_nothing_but_what_it_sees() -> None:
-    """No way leads from the agent to a world: neither its maker nor its step takes one, and what it does depends on the
-    observations alone."""
-    parameters = {*inspect.signature(ModularPipelineAgent).parameters, *inspect.signature(true_agent().act).parameters}
-    assert not parameters & {"world", "truth", "route", "roads"}
-    assert not agent_entry("mp").privileged
-    images = [picture(), picture(SceneClass.SIDEWALK), picture(near=True), picture(near=True)]
-    drives = []
-    for number in (3, 9):
-        world, agent = SemanticWorld(), true_agent()
-        world.reset(task_scenarios("town01", "one-turn")[number])
-        drives.append([agent.act(seen(image, Command.LEFT)) for image in images])
-        world.close()
-    assert drives[0] == drives[1]
 
 
 def test_a_new_episode_forgets_the_last() -> None:

@@ -67,17 +67,6 @@ def test_the_same_observations_give_the_same_controls_and_others_give_others() -
     assert len(set(drive(*range(12)))) > 1
 
 
-def test_what_it_does_depends_on_nothing_of_the_world_but_the_observation() -> None:
-    agent = ReinforcementAgent(lively(LOOKING), FrameEye())
-    controls = []
-    for world in (StraightRoad(), StraightRoad(speed=50, light=30.0)):
-        world.reset(SCENARIO)
-        agent.reset()
-        controls.append([agent.act(observation(k)) for k in range(5)])
-        world.step(Control())
-    assert controls[0] == controls[1]
-
-
 def test_a_decision_holds_for_some_steps() -> None:
     world = StraightRoad()
     agent = ReinforcementAgent(lively(PolicyConfig(repeat=3)), AffordanceEye(OraclePerception(world.truth)))
