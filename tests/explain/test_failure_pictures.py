@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,18 @@ import torch
 
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.report.runs import BenchmarkRun, load_run
-from caldrive.datatypes import Command
+from caldrive.datatypes import (
+    Affordances,
+    CameraConfig,
+    Command,
+    Control,
+    Image,
+    Observation,
+    Pose,
+    Step,
+    Truth,
+    VehicleState,
+)
 from caldrive.explain import failure_pictures
 from caldrive.explain.failure_pictures import (
     FOLDER,
@@ -28,7 +41,8 @@ from caldrive.perception.network.network import Network
 from tests.command_line import run_json
 from tests.explain.test_gradcam import CONFIG, pictures
 
-WANTED = Plan("red_light", (Glance(3, "1 s before", "red light: seen 3 %, true yes"), Glance(13, "red light", "")))
+TEXT = "red light: seen 3 %, true yes"
+WANTED = Plan("red_light", (Glance(3, 3.0, 0.0, "1 s before", TEXT), Glance(13, 13.0, 0.0, "red light", TEXT)))
 
 
 @pytest.fixture
@@ -50,7 +64,7 @@ def snapshots(n: int) -> list[Snapshot]:
 
 def test_an_agent_without_a_network_has_stills_without_attention_that_are_drawn_once(run: BenchmarkRun) -> None:
     answer = run_json("report", str(run.folder), "--attention", "--out", str(run.folder / "report"))
-    assert answer["failures"] == 1
+    assert (answer["failures"], answer["pictured"]) == (1, 1)
     (why,) = with_pictures(run).explanations.values()
     assert [moment.attention for moment in why.moments] == [None] * 3
     assert why.moments[0].text == "red light: not seen, true yes"
@@ -78,9 +92,37 @@ def test_attention_lies_beside_each_still(run: BenchmarkRun, network: Network) -
     for moment in why.moments:
         assert moment.attention is not None
         assert moment.attention != moment.still
-    assert "red light: seen 3 %, true yes; the network says red light: " in why.moments[0].text  # its driver is blind
+    assert f"{TEXT}; the network says " in why.moments[0].text  # its driver is blind
     other = replace(run, description=run.description | {"model": "another"})
     assert not with_pictures(other).explanations
+
+
+class Camera:
+    """A world that is only looked at."""
+
+    roads = route = object()
+
+    def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
+        return [np.zeros((mount.height, mount.width, 3), np.uint8) for mount in mounts]
+
+
+def drive(speed: float) -> Iterator[Step]:
+    """Straight on, so many metres a step; the number of the step is the brightness."""
+    for k in range(20):
+        observation = Observation(k / 10, np.full((2, 2, 3), k, np.uint8), 5.0, Command.LEFT)
+        yield Step(observation, Truth(k / 10, VehicleState(Pose(speed * k, 0.0, 0.0)), Affordances()), Control())
+
+
+def test_the_network_is_shown_the_images_until_each_moment() -> None:
+    world: Any = Camera()
+    seen = list(failure_pictures._snapshots(world, drive(1.0), WANTED.glances, span=5))
+    assert [[int(image[0, 0, 0]) for image in one.images] for one in seen] == [[0, 1, 2, 3], [9, 10, 11, 12, 13]]
+    assert (seen[0].still.shape, seen[0].command) == ((141, 320, 3), Command.LEFT)
+
+
+def test_a_car_that_is_elsewhere_than_it_was_is_not_looked_at() -> None:
+    world: Any = Camera()
+    assert not list(failure_pictures._snapshots(world, drive(1.1), WANTED.glances, span=5))
 
 
 def test_pictures_of_a_drive_that_goes_otherwise_are_not_shown(run: BenchmarkRun, network: Network) -> None:

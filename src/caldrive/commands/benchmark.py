@@ -99,5 +99,9 @@ class Report(Output):
         with locked_folder(self.out):
             write_whole(self.out / "report.md", text.encode())
             write_whole(self.out / "report.html", page.encode())
-        values = {"out": str(self.out), "runs": [run.name for run in runs], "failures": len(failures(runs))}
+        explained = [failure.explanation for failure in failures(runs)]
+        values = {
+            "out": str(self.out), "runs": [run.name for run in runs], "failures": len(explained),
+            "blamed": sum(why.blame != "" for why in explained), "pictured": sum(why.moments != () for why in explained),
+        }  # fmt: skip
         return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import simplejpeg
 
+from caldrive.affordances import BY_NAME
 from caldrive.agents.rows import model_path
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.artifacts import JPEG, read_still, read_trace
@@ -26,10 +27,11 @@ from caldrive.datatypes import CameraConfig, Command, Image, Step
 from caldrive.driving.rollout import rollout
 from caldrive.driving.setup import set_up
 from caldrive.explain.blame import MUST_AGREE, require_same
-from caldrive.explain.moments import Columns, Plan, plan
+from caldrive.explain.moments import Glance, Plan, plan
 from caldrive.files import as_type, json_line, locked_folder, read_json, write_whole
 from caldrive.interfaces import World, is_recordable
 from caldrive.progress import Progress, silent
+from caldrive.visualization.gauges import value_text
 
 if TYPE_CHECKING:  # who only reads what was drawn waits for no torch
     from caldrive.perception.network.network import Network
@@ -110,9 +112,7 @@ def _draw_run(run: BenchmarkRun, plans: Mapping[str, Plan]) -> Iterator[str]:
         with closing(world):
             for key, wanted in plans.items():
                 drive = rollout(world, agent, scenarios[key])
-                steps = [glance.step for glance in wanted.glances]
-                trace = read_trace(run.folder, key) or {}
-                snapshots = list(_snapshots(world, drive, trace, steps, network.span if network else 1))
+                snapshots = list(_snapshots(world, drive, wanted.glances, network.span if network else 1))
                 _save(run, key, wanted, snapshots, network)
                 yield key
 
@@ -128,21 +128,19 @@ def _network(driver: AgentSettings) -> Network | None:
     return load_network(model_path(driver.model))[0]
 
 
-def _snapshots(
-    world: World, drive: Iterable[Step], trace: Columns, steps: Sequence[int], span: int
-) -> Iterator[Snapshot]:
-    """What is seen in some steps of a drive, with the last `span` images; no more once the car is elsewhere than in its
-    trace."""
+def _snapshots(world: World, drive: Iterable[Step], glances: Sequence[Glance], span: int) -> Iterator[Snapshot]:
+    """What is seen at some moments of a drive, each with the last `span` images; no more once the car is elsewhere than
+    it was."""
     assert is_recordable(world)  # a benchmark drives in the embedded world
-    images = deque[Image](maxlen=span)
+    images, wanted = deque[Image](maxlen=span), {glance.step: glance for glance in glances}
     for number, step in enumerate(drive):
         images.append(step.observation.image)
-        if number in steps:
+        if (glance := wanted.get(number)) is not None:
             pose = step.truth.ego.pose
-            if math.hypot(pose.x - trace["x"][number], pose.y - trace["y"][number]) > SAME:
+            if math.hypot(pose.x - glance.x, pose.y - glance.y) > SAME:
                 return
             yield Snapshot(world.images([STILL])[0], tuple(images), step.observation.command)
-        if number >= max(steps):
+        if number >= max(wanted):
             return
 
 
@@ -168,14 +166,14 @@ def _attention(network: Network, affordance: str, snapshots: Sequence[Snapshot])
     """The stills with what the network looks at in each, and what it says. Each has a scale of its own: the gradient is
     many times larger in one moment than in another."""
     from caldrive.explain.gradcam import Question, attend
-    from caldrive.explain.overlay import overlay, said, scale_of
+    from caldrive.explain.overlay import overlay, scale_of
 
     attentions = [attend(network, Question(affordance, one.command), one.images, LAYER) for one in snapshots]
     pictures = [
         overlay(one.still, attention.now, scale_of([attention.now]), attention.reply.probability)
         for one, attention in zip(snapshots, attentions, strict=True)
     ]
-    return pictures, tuple(map(said, attentions))
+    return pictures, tuple(value_text(BY_NAME[affordance], attention.reply.value) for attention in attentions)
 
 
 def with_pictures(run: BenchmarkRun) -> BenchmarkRun:

@@ -26,6 +26,10 @@ class Glance:
 
     step: int
     """The number of the step."""
+    x: float
+    """Where the car is then, m."""
+    y: float
+    """Where the car is then, m."""
     title: str
     """Which moment it is."""
     text: str
@@ -48,7 +52,10 @@ def plan(failure: Failure, trace: Columns, driver: AgentSettings) -> Plan:
     affordance = suspect(failure, trace, driver, time)
     titles = {_step(trace, time - before): f"{before:g} s before" for before in BEFORE if before <= time}
     titles[_step(trace, time)] = f"{event} at {time:.1f} s"
-    glances = (Glance(step, title, _in_words(trace, step, affordance, driver)) for step, title in titles.items())
+    glances = (
+        Glance(step, trace["x"][step], trace["y"][step], title, _in_words(trace, step, affordance, driver))
+        for step, title in titles.items()
+    )
     return Plan(affordance, tuple(glances))
 
 

@@ -25,7 +25,7 @@ def failures_section(runs: Sequence[BenchmarkRun]) -> str:
     cards = [_card(failure, pictures.get(k, "")) for k, failure in enumerate(failed)]
     text = (
         f'<p><span id="shown">{len(failed)}</span> of {len(failed)} episodes that missed their goal or broke a rule.'
-        f" {len(pictures)} have pictures, first of all those that broke a rule; the folder of a run has all stills.</p>"
+        f" Pictures of {len(pictures)}, first of those that broke a rule; the folder of a run has all stills.</p>"
     )
     attention = any(moment.attention for failure in failed for moment in failure.explanation.moments)
     text += f"<p>{ATTENTION}</p>" if attention else ""
