@@ -101,7 +101,10 @@ class Report(Output):
             write_whole(self.out / "report.html", page.encode())
         explained = [failure.explanation for failure in failures(runs)]
         values = {
-            "out": str(self.out), "runs": [run.name for run in runs], "failures": len(explained),
-            "blamed": sum(why.blame != "" for why in explained), "pictured": sum(why.moments != () for why in explained),
-        }  # fmt: skip
+            "out": str(self.out),
+            "runs": [run.name for run in runs],
+            "failures": len(explained),
+            "blamed": sum(why.blame != "" for why in explained),
+            "pictured": sum(why.moments != () for why in explained),
+        }
         return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")
