@@ -68,15 +68,15 @@ class Replay(Output):
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Output):
-    """Tables and a page on one or more benchmarks, with whom `caldrive blame` found to blame."""
+    """Tables and a page on one or more benchmarks."""
 
     folders: tyro.conf.Positional[tuple[Path, ...]]
     """Benchmarks' folders, side by side in the report."""
     out: Path = Path("out/report")
     """Folder for report.md and report.html."""
     attention: bool = False
-    """Drive the failures again, 30 at most, and draw what the network looked at before each; those that are drawn
-    already are shown without it, too."""
+    """Drive failures again, 30 at most, and draw what the network looked at before each; what is drawn already is shown
+    without this, too."""
 
     def run(self, progress: Progress) -> Answer:
         """Writes the report as Markdown and as an HTML page."""
@@ -101,10 +101,8 @@ class Report(Output):
             write_whole(self.out / "report.html", page.encode())
         explained = [failure.explanation for failure in failures(runs)]
         values = {
-            "out": str(self.out),
-            "runs": [run.name for run in runs],
-            "failures": len(explained),
+            "out": str(self.out), "runs": [run.name for run in runs], "failures": len(explained),
             "blamed": sum(why.blame != "" for why in explained),
             "pictured": sum(why.moments != () for why in explained),
-        }
+        }  # fmt: skip
         return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from caldrive.agents.rows import model_path
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.artifacts import JPEG, read_still, read_trace
 from caldrive.benchmark.report.failure_cards import by_importance
-from caldrive.benchmark.report.runs import BenchmarkRun, Explanation, Failure, Moment, failures
+from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Moment, failures
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.datatypes import CameraConfig, Command, Image, Step
 from caldrive.driving.rollout import rollout
@@ -155,6 +156,8 @@ def _save(run: BenchmarkRun, key: str, wanted: Plan, snapshots: Sequence[Snapsho
         pictures, replies = _attention(network, wanted.affordance, snapshots)
     path.unlink(missing_ok=True)  # what it says may be of other pictures
     for kind, drawn in (("still", [one.still for one in snapshots]), ("attention", pictures)):
+        for old in path.parent.glob(f"{escape(key)}-[0-9]-{kind}.jpg"):
+            old.unlink()
         for k, picture in enumerate(drawn):
             write_whole(_picture_path(path, k, kind), simplejpeg.encode_jpeg(picture, **QUALITY))
     blind = wanted.affordance in (run.description.get("blind") or ())
@@ -178,28 +181,23 @@ def _attention(network: Network, affordance: str, snapshots: Sequence[Snapshot])
 
 def with_pictures(run: BenchmarkRun) -> BenchmarkRun:
     """A run with the pictures of its failures that are drawn. Raises ValueError where one is damaged."""
-    drawn = {failure.result.trial.key: _read(run, failure.result.trial.key) for failure in run.failures}
-    more = {
-        key: replace(run.explanations.get(key, Explanation()), moments=_moments(_path(run, key), one), note=one.note)
-        for key, one in drawn.items()
-        if one is not None
-    }
-    return replace(run, explanations={**run.explanations, **more})
+    explanations = dict(run.explanations)
+    for failure in run.failures:
+        key = failure.result.trial.key
+        if drawn := _read(run, key):
+            moments = tuple(_moments(_path(run, key), drawn))
+            explanations[key] = replace(failure.explanation, moments=moments, note=drawn.note)
+    return replace(run, explanations=explanations)
 
 
-def _moments(path: Path, drawn: Drawn) -> tuple[Moment, ...]:
-    """The moments of a failure, from the pictures beside its file."""
-    if drawn.note == OTHERWISE:
-        return ()
-    moments = []
+def _moments(path: Path, drawn: Drawn) -> Iterator[Moment]:
+    """The moments of a failure, from the pictures that are beside its file."""
     for k, glance in enumerate(drawn.plan.glances):
-        attention = _picture_path(path, k, "attention")
         text = f"{glance.text}; the network says {drawn.replies[k]}" if drawn.replies else glance.text
-        moments.append(Moment(
-            glance.title, text, read_still(_picture_path(path, k, "still")),
-            read_still(attention) if not drawn.note else None,
-        ))  # fmt: skip
-    return tuple(moments)
+        still, attention = (_picture_path(path, k, kind) for kind in ("still", "attention"))
+        if still.is_file():
+            seen = read_still(attention) if attention.is_file() else None
+            yield Moment(glance.title, text, read_still(still), seen)
 
 
 def _read(run: BenchmarkRun, key: str) -> Drawn | None:

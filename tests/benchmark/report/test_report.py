@@ -250,7 +250,7 @@ def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
 
 def test_blame_is_counted_and_stands_beside_each_failure(runs: list[BenchmarkRun]) -> None:
     table = next(table for table in tables(runs) if table.title == "Blame")
-    assert [row for row in table.rows if row[2] != "0"] == [("cal", "red light", "1", "1", "1")]
+    assert [row for row in table.rows if row[3] != "0"] == [("cal", "red light", "1 of 1", "1")]
     assert len(table.rows) == len(BY_NAME)  # of the run of which nobody knows, none
     assert "| to blame |" in report_text(runs)
     assert "| red light: its truth rescues it |" in report_text(runs)

@@ -202,10 +202,10 @@ def _blame(runs: Sequence[BenchmarkRun]) -> Table:
         blamed = Counter(name for why in known for name in why.blamed)
         alone = Counter(name for why in known for name in why.alone)
         for name in dict.fromkeys([*(spec.title for spec in SPECS), *blamed]) if known else ():
-            rows.append((run.name, name, str(blamed[name]), str(alone[name]), str(len(known))))
+            rows.append((run.name, name, f"{blamed[name]} of {len(known)}", str(alone[name])))
     text = (
-        "How many failures go well once the truth of an affordance is told, and how many go wrong when it alone is "
-        "seen and all others are told. A failure can have several that would each rescue it."
+        "How many failures each affordance is to blame for: they go well once its truth is told; and how many go wrong "
+        "when it alone is seen and all others are told. A failure can have several, each of which rescues it."
     )
-    head = ("agent", "to blame", "rescued by its truth", "fail with it alone seen", "of failures")
+    head = ("agent", "to blame", "failures", "fail with it alone seen")
     return Table(title="Blame", text=text, head=head, rows=tuple(rows))
