@@ -4,30 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from caldrive.affordances import BY_NAME
-from caldrive.benchmark.runner import benchmark
-from caldrive.benchmark.settings import BenchmarkSettings
-from caldrive.benchmark.suites import Trial, suite, to_json
-from caldrive.explain.blame import ALL, Blame, blame, read_blame, tellings
+from caldrive.benchmark.report.runs import BenchmarkRun
+from caldrive.explain.blame import ALL, ELSEWHERE, FOLDER, TOGETHER, Blame, blame, read_blame, tellings, with_blame
 from tests.command_line import run_json
-
-
-@pytest.fixture(scope="module")
-def blind_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run of an oracle that sees no red light, in a short episode that has one."""
-    folder = tmp_path_factory.mktemp("blame")
-    straight = [trial.scenario for trial in suite("quick") if trial.scenario.task == "straight"]
-    shortest = min(straight, key=lambda scenario: scenario.time_limit)
-    (folder / "suite.json").write_text(to_json([Trial("light", "training", shortest)]))
-    settings = BenchmarkSettings(
-        suite=str(folder / "suite.json"), out=folder / "run", agent="oracle", blind=("red_light",), workers=1
-    )
-    list(benchmark(settings))
-    return folder / "run"
 
 
 def test_each_affordance_is_told_alone_and_seen_alone() -> None:
@@ -45,6 +30,24 @@ def test_blame_says_in_words_what_a_failure_comes_from() -> None:
     assert found.of("a").startswith("red light:")
     assert found.of("b") == "several affordances together"
     assert found.of("c").startswith("the controller or the world")
+    assert [found.blamed(key) for key in "abc"] == [("red light",), (TOGETHER,), (ELSEWHERE,)]
+
+
+def check_what_a_report_says(run: BenchmarkRun, found: Path) -> None:
+    """A run whose folder holds what was found is blamed on the light; other results than the run's are a problem."""
+    assert with_blame(run) is run
+    moved = replace(run, folder=found.parent / "run")
+    shutil.copytree(found, moved.folder / FOLDER)
+    why = with_blame(moved).failures[0].explanation
+    assert (why.blamed, why.alone) == (("red light",), ("red light",))
+    assert why.blame.startswith("red light: the truth of it")
+    for other in (replace(moved, results=()), replace(moved, description=moved.description | {"code": "behaviour-1"})):
+        (problem,) = with_blame(other).problems
+        assert "of other results, wanted those of now: remove it, and type caldrive blame" in problem
+    shutil.rmtree(moved.folder / FOLDER / "seen-red_light")
+    unfinished = with_blame(moved)
+    assert unfinished.problems[0].startswith("blame: found all episodes in")
+    assert not unfinished.explanations
 
 
 def test_a_driver_who_sees_no_light_is_rescued_by_it_alone(blind_run: Path, tmp_path: Path) -> None:
@@ -57,6 +60,7 @@ def test_a_driver_who_sees_no_light_is_rescued_by_it_alone(blind_run: Path, tmp_
     answer = run_json("blame", str(blind_run), "--out", str(tmp_path), "--workers", "1")  # nothing is driven again
     assert (answer["episodes"], answer["rest"]) == (1, [])
     assert (tmp_path / "told-all" / "results.jsonl").read_bytes() == before
+    check_what_a_report_says(run, tmp_path)
     (tmp_path / "told-all" / "results.jsonl").unlink()
     with pytest.raises(ValueError, match=r"found 1 episodes in .*told-all that are not driven"):
         read_blame(tmp_path)

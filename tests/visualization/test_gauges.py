@@ -11,7 +11,17 @@ from PIL import ImageDraw
 
 from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Affordances, Image
-from caldrive.visualization.gauges import AMBER, BAR_LEFT, BAR_RIGHT, BLUE, GAUGES, RED, _text, draw_frame, draw_gauges
+from caldrive.visualization.gauges import (
+    AMBER,
+    BAR_LEFT,
+    BAR_RIGHT,
+    BLUE,
+    GAUGES,
+    RED,
+    draw_frame,
+    draw_gauges,
+    value_text,
+)
 
 MIDDLE = (BAR_LEFT + BAR_RIGHT) / 2
 
@@ -48,7 +58,7 @@ def test_every_gauge_is_that_of_an_affordance() -> None:
     ],
 )
 def test_values_are_written_in_the_units_that_people_read(name: str, value: float | None, text: str) -> None:
-    assert _text(BY_NAME[name], value) == text
+    assert value_text(BY_NAME[name], value) == text
 
 
 def test_what_lies_to_the_left_grows_to_the_left() -> None:

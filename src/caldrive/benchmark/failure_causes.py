@@ -32,6 +32,8 @@ class FailureCause:
 
     event: str
     """What happened first."""
+    time: float
+    """When it happened, s."""
     x: float
     """Where it happened, m."""
     y: float
@@ -61,7 +63,7 @@ def failure_cause(trace: Columns) -> FailureCause:
     events = [(step, event) for event, step in first_steps.items() if step is not None]
     step, event = min(events, default=(len(time) - 1, TOO_SLOW))
     return FailureCause(
-        event=event, x=trace["x"][step], y=trace["y"][step], command=trace["command"][step],
+        event=event, time=trace["time"][step], x=trace["x"][step], y=trace["y"][step], command=trace["command"][step],
         seen=_seen(trace, step, event),
     )  # fmt: skip
 

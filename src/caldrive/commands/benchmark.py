@@ -74,22 +74,35 @@ class Report(Output):
     """Benchmarks' folders, side by side in the report."""
     out: Path = Path("out/report")
     """Folder for report.md and report.html."""
+    attention: bool = False
+    """Drive failures again, 30 at most, and draw what the network looked at before each; what is drawn already is shown
+    without this, too."""
 
     def run(self, progress: Progress) -> Answer:
         """Writes the report as Markdown and as an HTML page."""
         from caldrive.benchmark.report.page import report_page, report_text
         from caldrive.benchmark.report.runs import failures, load_runs
         from caldrive.checks import require_writable_folder
+        from caldrive.explain.blame import with_blame
+        from caldrive.explain.failure_pictures import draw_pictures, with_pictures
         from caldrive.files import locked_folder, write_whole
 
         if not self.folders:
             raise ValueError("found no folder, wanted a benchmark's: type caldrive report out/benchmark")
-        runs = load_runs(self.folders)
+        runs = [with_blame(run) for run in load_runs(self.folders)]
         require_writable_folder(self.out)
-        progress("writing", 0.2)
+        if self.attention:
+            draw_pictures(runs, progress)
+        runs = [with_pictures(run) for run in runs]
+        progress("writing", 0.9)
         text, page = report_text(runs), report_page(runs)
         with locked_folder(self.out):
             write_whole(self.out / "report.md", text.encode())
             write_whole(self.out / "report.html", page.encode())
-        values = {"out": str(self.out), "runs": [run.name for run in runs], "failures": len(failures(runs))}
+        explained = [failure.explanation for failure in failures(runs)]
+        values = {
+            "out": str(self.out), "runs": [run.name for run in runs], "failures": len(explained),
+            "blamed": sum(why.blame != "" for why in explained),
+            "pictured": sum(why.moments != () for why in explained),
+        }  # fmt: skip
         return Answer(values, f"report: {self.out / 'report.html'}, {self.out / 'report.md'}")

@@ -30,9 +30,9 @@ class Blame(Output):
     def run(self, progress: Progress) -> Answer:
         """Drives what is missing; answers with how many failures each affordance is to blame for."""
         from caldrive.commands.tables import blame_table
-        from caldrive.explain.blame import blame
+        from caldrive.explain.blame import FOLDER, blame
 
-        found, run = blame(self.folder, self.out or self.folder / "blame", self.workers, self.ray, progress)
+        found, run = blame(self.folder, self.out or self.folder / FOLDER, self.workers, self.ray, progress)
         values = asdict(found) | {
             "episodes": len(run.results), "rest": found.rest, "blame": {key: found.of(key) for key in found.failures},
         }  # fmt: skip

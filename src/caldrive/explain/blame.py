@@ -8,13 +8,13 @@ seen, and all others told, needs no other mistake.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from caldrive.affordances import BY_NAME
+from caldrive.affordances import BY_NAME, SPECS
 from caldrive.benchmark.metrics import is_clean
-from caldrive.benchmark.report.runs import BenchmarkRun, load_run
-from caldrive.benchmark.run_folder import RunFolder, driver_provenance
+from caldrive.benchmark.report.runs import BenchmarkRun, Explanation, load_run
+from caldrive.benchmark.run_folder import RUN, RunFolder, driver_provenance
 from caldrive.benchmark.runner import benchmark
 from caldrive.benchmark.settings import BenchmarkSettings
 from caldrive.benchmark.suites import Trial, to_json
@@ -23,7 +23,8 @@ from caldrive.files import write_whole
 from caldrive.progress import Progress, silent
 
 ALL = "all"
-SUITE = "suite.json"
+TOGETHER, ELSEWHERE = "several affordances together", "the controller or the world"
+FOLDER, SUITE = "blame", "suite.json"  # in a run's folder, and in the other
 MUST_AGREE = ("code", "model", "precision", "agent_source", "controller_source")  # for an episode to come again
 
 
@@ -60,14 +61,20 @@ class Blame:
         """Those of the controller and of the world: they go wrong with all affordances told."""
         return tuple(key for key in self.failures if key not in self.rescued[ALL])
 
-    def of(self, key: str) -> str:
-        """What an episode's failure comes from, in words."""
+    def blamed(self, key: str) -> tuple[str, ...]:
+        """What an episode's failure comes from: each affordance whose truth rescues it, by its title, or what else."""
         if key in self.rest:
-            return "the controller or the world: it fails with the truth, too"
-        names = [BY_NAME[name].title for name in BY_NAME if key in self.rescued[name]]
-        if not names:
-            return "several affordances together"
-        return f"{' or '.join(names)}: the truth of it rescues the episode"
+            return (ELSEWHERE,)
+        return tuple(spec.title for spec in SPECS if key in self.rescued[spec.name]) or (TOGETHER,)
+
+    def of(self, key: str) -> str:
+        """The same in words."""
+        blamed = self.blamed(key)
+        if blamed == (ELSEWHERE,):
+            return f"{ELSEWHERE}: it fails with the truth, too"
+        if blamed == (TOGETHER,):
+            return TOGETHER
+        return f"{' or '.join(blamed)}: the truth of it rescues the episode"
 
 
 def blame(
@@ -82,7 +89,7 @@ def blame(
     failed = [failure.result.trial for failure in whole.failures]
     if not failed:
         return Blame((), dict.fromkeys((*BY_NAME, ALL), ()), dict.fromkeys(BY_NAME, ())), whole
-    _require_same(folder)
+    require_same(folder)
     require_writable_folder(out)
     suite, content = out / SUITE, to_json(failed).encode()
     if not (suite.is_file() and suite.read_bytes() == content):
@@ -96,14 +103,14 @@ def blame(
     return read_blame(out), whole
 
 
-def _require_same(folder: RunFolder) -> None:
+def require_same(folder: RunFolder) -> None:
     """Raises ValueError where a run's episodes would not come again."""
     now = driver_provenance(folder.driver)
     for name in MUST_AGREE:
         if folder.description.get(name) != now.get(name):
             raise ValueError(
                 f"found in {folder.path} results with {name} {folder.description.get(name)}, wanted {now.get(name)}, "
-                "as an episode must go as before to be blamed on something: drive the benchmark again"
+                "as an episode must go as before to be explained: drive the benchmark again"
             )
 
 
@@ -135,9 +142,35 @@ def _trials(out: Path) -> Sequence[Trial]:
 
 def _clean(folder: Path) -> set[str]:
     """The keys of a folder's episodes that went well. Raises ValueError where some are not driven yet."""
-    run = RunFolder(folder)
-    if missing := run.missing():
+    missing = "all" if not (folder / RUN).is_file() else len(RunFolder(folder).missing())
+    if missing:
         raise ValueError(
-            f"found {len(missing)} episodes in {folder} that are not driven, wanted all: type caldrive blame as before"
+            f"found {missing} episodes in {folder} that are not driven, wanted none: type caldrive blame as before"
         )
-    return {result.trial.key for result in run.results() if is_clean(result)}
+    return {result.trial.key for result in RunFolder(folder).results() if is_clean(result)}
+
+
+def with_blame(run: BenchmarkRun) -> BenchmarkRun:
+    """A run with whom its failures are blamed on, where that is known in its folder; what is wrong with it becomes one
+    of the run's problems."""
+    if not (run.folder / FOLDER).is_dir():
+        return run
+    try:
+        found = _blame_of(run)
+    except ValueError as error:
+        return replace(run, problems=(*run.problems, f"blame: {error}"))
+    spoilt = {key: tuple(spec.title for spec in SPECS if key in found.spoilt[spec.name]) for key in found.failures}
+    explanations = {key: Explanation(found.of(key), found.blamed(key), alone) for key, alone in spoilt.items()}
+    return replace(run, explanations=explanations)
+
+
+def _blame_of(run: BenchmarkRun) -> Blame:
+    """What is in a run's folder. Raises ValueError where that is not finished, or of other results."""
+    out = run.folder / FOLDER
+    found, about = read_blame(out), RunFolder(out / f"told-{ALL}").description
+    same = all(about.get(name) == run.description.get(name) for name in MUST_AGREE)
+    if not same or set(found.failures) != {failure.result.trial.key for failure in run.failures}:
+        raise ValueError(
+            f"found {out} of other results, wanted those of now: remove it, and type caldrive blame {run.folder}"
+        )
+    return found

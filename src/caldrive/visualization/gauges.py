@@ -92,7 +92,7 @@ def _share(spec: AffordanceSpec, value: float) -> float:
     return (value - spec.low) / (high - spec.low)
 
 
-def _text(spec: AffordanceSpec, value: float | None) -> str:
+def value_text(spec: AffordanceSpec, value: float | None) -> str:
     """A value as people read it: percent, metres, degrees, or the number on a sign."""
     if value is None:
         return NOT_GIVEN
@@ -137,9 +137,9 @@ def draw_gauges(draw: Draw, seen: Affordances | None, true: Affordances | None) 
     """The values, over a frame by `draw_frame`. seen: None where the agent gives none; true: None leaves it out."""
     for row, spec in enumerate(SPECS):
         value, real = _value(spec, seen), _value(spec, true)
-        write(draw, (VALUE, _middle(row)), _text(spec, value), 16, MUTED if value is None else TEXT, "rm")
+        write(draw, (VALUE, _middle(row)), value_text(spec, value), 16, MUTED if value is None else TEXT, "rm")
         if real is not None:
-            write(draw, (TRUE, _middle(row)), _text(spec, real), 13, MUTED, "rm")
+            write(draw, (TRUE, _middle(row)), value_text(spec, real), 13, MUTED, "rm")
         draw_value = _fill_bar if _has_bar(spec) else _draw_classes
         draw_value(draw, _bar(row), spec, value, real)
 

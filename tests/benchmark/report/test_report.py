@@ -20,10 +20,19 @@ from rich.console import Console
 
 from caldrive.affordances import BY_NAME
 from caldrive.benchmark.artifacts import trace_path
-from caldrive.benchmark.report import page as page_module
+from caldrive.benchmark.report import failure_cards
+from caldrive.benchmark.report.failure_cards import failures_section
 from caldrive.benchmark.report.figures import error_sums
 from caldrive.benchmark.report.page import report_page, report_text
-from caldrive.benchmark.report.runs import LARGE_ERRORS, BenchmarkRun, failures, load_run, load_runs
+from caldrive.benchmark.report.runs import (
+    LARGE_ERRORS,
+    BenchmarkRun,
+    Explanation,
+    Moment,
+    failures,
+    load_run,
+    load_runs,
+)
 from caldrive.benchmark.report.tables import tables
 from caldrive.benchmark.suites import TrialResult, suite
 from caldrive.commands.tables import benchmark_table
@@ -92,7 +101,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
     path = trace_path(folder, key)
     path.parent.mkdir()
     path.write_bytes(gzip.compress(json.dumps(content).encode()))
-    return both
+    jpeg = still.read_bytes()
+    moments = tuple(Moment(title, "red light: seen 3 %, true yes", jpeg, jpeg) for title in ("1 s before", "red light"))
+    why = Explanation("red light: its truth rescues it", ("red light",), ("red light",), moments)
+    return [both[0], replace(both[1], explanations={both[1].results[9].trial.key: why})]
 
 
 def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
@@ -215,6 +227,7 @@ def page(runs: list[BenchmarkRun], tmp_path_factory: pytest.TempPathFactory) -> 
         opened.asked, opened.complaints = [], []
         opened.on("request", lambda request: opened.asked.append(request.url))
         opened.on("pageerror", lambda error: opened.complaints.append(str(error)))
+        opened.on("console", lambda message: opened.complaints.append(message.text))
         opened.goto(path.as_uri())
         yield opened
         browser.close()
@@ -223,16 +236,38 @@ def page(runs: list[BenchmarkRun], tmp_path_factory: pytest.TempPathFactory) -> 
 def test_who_broke_a_rule_is_shown_before_who_only_took_too_long(
     runs: list[BenchmarkRun], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page_module, "MAX_STILLS", 1)
+    monkeypatch.setattr(failure_cards, "PICTURE_BYTES", 1000)  # one still
     slow, breaker = runs[1].results[4], runs[1].results[9]
     slow = replace(slow, episode=replace(slow.episode, infractions=()))
     for result, width in ((slow, 40), (breaker, 41)):
         picture = simplejpeg.encode_jpeg(np.full((20, width, 3), width, np.uint8))
         (runs[1].folder / "stills" / f"{result.trial.key}-0.jpg").write_bytes(picture)
-    html = report_page([replace(runs[1], results=(slow, breaker))])
+    html = failures_section([replace(runs[1], results=(slow, breaker), explanations={})])
     (shown,) = re.findall(r"data:image/jpeg;base64,([^\"]+)", html)
     (runs[1].folder / "stills" / f"{breaker.trial.key}-0.jpg").unlink()
     assert simplejpeg.decode_jpeg(base64.b64decode(shown)).shape == (20, 41, 3)
+
+
+def test_blame_is_counted_and_stands_beside_each_failure(runs: list[BenchmarkRun]) -> None:
+    table = next(table for table in tables(runs) if table.title == "Blame")
+    assert [row for row in table.rows if row[3] != "0"] == [("cal", "red light", "1 of 1", "1")]
+    assert len(table.rows) == len(BY_NAME)  # of the run of which nobody knows, none
+    assert "| to blame |" in report_text(runs)
+    assert "| red light: its truth rescues it |" in report_text(runs)
+    assert "Blame" not in [table.title for table in tables(runs[:1])]
+    assert "to blame" not in report_text(runs[:1])
+
+
+@pytest.mark.parametrize("size", [10_300, 30_000])
+def test_thirty_failures_with_pictures_stay_below_three_megabytes(size: int, tmp_path: Path) -> None:
+    why = Explanation(moments=(Moment("1 s before", "", b"x" * size, b"x" * size),) * 3)
+    sound = run("cal", tmp_path)
+    bad = [replace(one, episode=replace(one.episode, outcome=Outcome.TIMEOUT)) for one in sound.results[:30]]
+    explained = replace(sound, results=tuple(bad), explanations={one.trial.key: why for one in bad})
+    html = failures_section([explained])
+    assert html.count("<article") == 30
+    assert html.count("<img") == (6 * 30 if size == 10_300 else 6 * 10)
+    assert len(html) < 2_700_000  # what else is on a page takes less than the rest
 
 
 def column(page: Any, table: int, head: str) -> list[str]:
@@ -298,8 +333,25 @@ def test_the_page_opens_with_its_tables_plots_and_stills(page: Any) -> None:
     heads = page.locator("h2").all_inner_texts()
     assert {"Runs", "Success", "Infractions", "Driving behaviour", "Speed over distance", "Failures"} <= set(heads)
     assert page.locator("svg").count() >= 5
-    assert page.locator("article img").count() == 1
-    assert page.evaluate("document.querySelector('article img').naturalWidth") == 40
+    pictures = page.locator("article img")
+    assert pictures.count() == 1 + 2 * 2  # a still of the benchmark, and two moments with attention
+    assert set(pictures.evaluate_all("all => all.map(one => one.naturalWidth)")) == {40}
+
+
+def test_no_page_is_wider_than_a_telephone(page: Any) -> None:
+    page.set_viewport_size({"width": 390, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.set_viewport_size({"width": 1280, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
+
+
+def test_a_failure_says_whom_to_blame_and_what_was_looked_at(page: Any) -> None:
+    page.select_option("select[data-filter=blame]", "red light")
+    card = page.locator("article:visible")
+    assert card.count() == 1
+    assert "To blame red light: its truth rescues it" in card.inner_text().replace("\n", " ")
+    assert "1 s before" in card.locator("figcaption").first.inner_text()
+    page.select_option("select[data-filter=blame]", "")
 
 
 def test_nothing_is_fetched_from_outside(page: Any) -> None:

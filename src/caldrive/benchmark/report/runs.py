@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,36 @@ OPTIONS = {"--controller": "controller", "--time-limit": "time_limit", "--seed":
 
 
 @dataclass(frozen=True)
+class Moment:
+    """What the car saw at a moment of a failure."""
+
+    title: str
+    """Which moment it is."""
+    text: str
+    """What was seen and what was true, empty where the agent gives no affordances."""
+    still: bytes
+    """What the camera saw, as JPEG."""
+    attention: bytes | None = None
+    """The same with what the network looked at, where it is known."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What is known of why an episode failed; `caldrive.explain` finds it out."""
+
+    blame: str = ""
+    """What the failure comes from, in words."""
+    blamed: tuple[str, ...] = ()
+    """The same as names: each of them alone is to blame."""
+    alone: tuple[str, ...] = ()
+    """The affordances that spoil the episode when they alone are seen."""
+    moments: tuple[Moment, ...] = ()
+    """How it came to it, the last one where it happens."""
+    note: str = ""
+    """What there is to say about these moments."""
+
+
+@dataclass(frozen=True)
 class BenchmarkRun:
     """One run's folder."""
 
@@ -42,6 +72,8 @@ class BenchmarkRun:
     """Its episodes, in the suite's order."""
     problems: tuple[str, ...] = ()
     """What a reader should know: unfinished, edited or damaged, a sentence each."""
+    explanations: Mapping[str, Explanation] = field(default_factory=dict)
+    """Why episodes failed, by their keys, as far as it is known."""
 
     def of_condition(self, condition: str) -> list[TrialResult]:
         """The episodes of one condition."""
@@ -58,7 +90,8 @@ class BenchmarkRun:
         missed = result.episode.outcome in WITHOUT_END
         trace = read_trace(self.folder, result.trial.key) if missed else None
         cause = failure_cause(trace) if trace else None
-        return Failure(run=self.name, result=result, errors_before=errors, cause=cause)
+        why = self.explanations.get(result.trial.key, Explanation())
+        return Failure(run=self.name, result=result, errors_before=errors, cause=cause, explanation=why)
 
     @property
     def command(self) -> str:
@@ -99,6 +132,8 @@ class Failure:
     """For each infraction, which affordances were wrong in the seconds before it, in words."""
     cause: FailureCause | None = None
     """How a missed goal began, where that is known."""
+    explanation: Explanation = Explanation()
+    """Why it happened, as far as it is known."""
 
 
 def load_run(path: Path) -> BenchmarkRun:

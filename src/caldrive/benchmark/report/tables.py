@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from caldrive.affordances import BY_NAME, AffordanceSpec
+from caldrive.affordances import BY_NAME, SPECS, AffordanceSpec
 from caldrive.benchmark.failure_causes import common_places
 from caldrive.benchmark.metrics import (
     Cell,
@@ -39,7 +40,7 @@ def tables(runs: Sequence[BenchmarkRun]) -> list[Table]:
     """All tables of the report: the runs, their success, and of the others those that are not empty."""
     others = [
         _paired(runs), infractions_table(runs), touches_table(runs), red_lights_table(runs), speeding_table(runs),
-        _comfort(runs), _affordance_errors(runs), _failure_causes(runs),
+        _comfort(runs), _affordance_errors(runs), _failure_causes(runs), _blame(runs),
     ]  # fmt: skip
     return [_runs(runs), _success(runs), *(table for table in [_problems(runs), *others] if table.rows)]
 
@@ -192,3 +193,19 @@ def _failure_causes(runs: Sequence[BenchmarkRun]) -> Table:
     text = "What the car did wrong first in the episodes that missed their goal, and near which place."
     head = ("agent", "town", "what", "near", "command", "episodes")
     return Table(title="Failure causes", text=text, head=head, rows=tuple(rows))
+
+
+def _blame(runs: Sequence[BenchmarkRun]) -> Table:
+    rows = []
+    for run in runs:
+        known = [failure.explanation for failure in run.failures if failure.explanation.blame]
+        blamed = Counter(name for why in known for name in why.blamed)
+        alone = Counter(name for why in known for name in why.alone)
+        for name in dict.fromkeys([*(spec.title for spec in SPECS), *blamed]) if known else ():
+            rows.append((run.name, name, f"{blamed[name]} of {len(known)}", str(alone[name])))
+    text = (
+        "How many failures each affordance is to blame for: they go well once its truth is told; and how many go wrong "
+        "when it alone is seen and all others are told. A failure can have several, each of which rescues it."
+    )
+    head = ("agent", "to blame", "failures", "fail with it alone seen")
+    return Table(title="Blame", text=text, head=head, rows=tuple(rows))

@@ -1,0 +1,118 @@
+"""The page's failures: a card for each with its pictures and whom it is blamed on, and menus that filter the cards."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from caldrive.benchmark.artifacts import read_still, still_paths
+from caldrive.benchmark.metrics import succeeded
+from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Moment, failures
+
+PICTURE_BYTES = 1_900_000  # of all pictures; on the page they take a third more, and it is to stay below 3 MB
+ATTENTION = (
+    "The second picture of a moment shows what the network looks at (Grad-CAM), each on a scale of its own. Of a "
+    "class, green to red says how likely the network finds it; of a number, orange makes it larger and blue smaller."
+)
+
+
+def failures_section(runs: Sequence[BenchmarkRun]) -> str:
+    """The section with all failures of some runs."""
+    failed, folders = failures(runs), {run.name: run.folder for run in runs}
+    pictures = _chosen_pictures(failed, folders)
+    cards = [_card(failure, pictures.get(k, "")) for k, failure in enumerate(failed)]
+    text = (
+        f'<p><span id="shown">{len(failed)}</span> of {len(failed)} episodes that missed their goal or broke a rule.'
+        f" Pictures of {len(pictures)}, first of those that broke a rule; the folder of a run has all stills.</p>"
+    )
+    attention = any(moment.attention for failure in failed for moment in failure.explanation.moments)
+    text += f"<p>{ATTENTION}</p>" if attention else ""
+    menus = f'<p class="menus">{_filters(failed)}</p>'
+    return f'<section id="failures"><h2>Failures</h2>{text}{menus}{"".join(cards)}</section>'
+
+
+def by_importance(failed: Sequence[Failure]) -> list[int]:
+    """The numbers of failures, who broke a rule before who only took too long."""
+    return sorted(range(len(failed)), key=lambda k: not failed[k].result.episode.infractions)
+
+
+def _chosen_pictures(failed: Sequence[Failure], folders: Mapping[str, Path]) -> dict[int, str]:
+    """The pictures of as many failures as PICTURE_BYTES allow, by the failures' numbers."""
+    chosen, left = dict[int, str](), PICTURE_BYTES
+    for k in by_importance(failed):
+        html, size = _pictures(failed[k], folders[failed[k].run])
+        left -= size
+        if left < 0:
+            break
+        if size:
+            chosen[k] = html
+    return chosen
+
+
+def _pictures(failure: Failure, folder: Path) -> tuple[str, int]:
+    """A failure's moments, or else the stills of its benchmark, and how many bytes the pictures have."""
+    moments = failure.explanation.moments or [
+        Moment("", "", read_still(path)) for path in still_paths(folder, failure.result.trial.key)
+    ]
+    size = sum(len(moment.still) + len(moment.attention or b"") for moment in moments)
+    return f'<div class="moments">{"".join(map(_moment, moments))}</div>', size
+
+
+def _moment(moment: Moment) -> str:
+    images = _image(moment.still, "still") + (_image(moment.attention, "attention") if moment.attention else "")
+    caption = f"<b>{escape(moment.title)}</b> {escape(moment.text)}" if moment.title else ""
+    return f"<figure>{images}<figcaption>{caption}</figcaption></figure>"
+
+
+def _image(jpeg: bytes, name: str) -> str:
+    """A JPEG inside the page."""
+    return f'<img alt="{name}" src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}">'
+
+
+def _filters(failed: Sequence[Failure]) -> str:
+    """A menu for each property by which failures are filtered."""
+    choices = {
+        "run": list(dict.fromkeys(failure.run for failure in failed)),
+        "condition": list(dict.fromkeys(failure.result.trial.condition for failure in failed)),
+        "task": list(dict.fromkeys(failure.result.trial.scenario.task for failure in failed)),
+        "kind": [*sorted({kind for failure in failed for kind in _infraction_kinds(failure)}), "goal missed"],
+        "blame": sorted({name for failure in failed for name in failure.explanation.blamed}),
+    }
+    return "".join(
+        f'<label>{name} <select data-filter="{name}"><option value="">all</option>'
+        + "".join(f"<option>{escape(value)}</option>" for value in values)
+        + "</select></label>"
+        for name, values in choices.items()
+        if values
+    )
+
+
+def _infraction_kinds(failure: Failure) -> set[str]:
+    return {infraction.kind.value for infraction in failure.result.episode.infractions}
+
+
+def _card(failure: Failure, pictures: str) -> str:
+    """What is shown of one failure."""
+    trial, episode, why = failure.result.trial, failure.result.episode, failure.explanation
+    infractions = [
+        f"<li>{escape(infraction.kind.value)} at {infraction.time:.1f} s{'' if infraction.at_fault else ', by others'}"
+        f"<small>wrong in the 3 s before: {escape(errors)}</small></li>"
+        for infraction, errors in zip(episode.infractions, failure.errors_before, strict=True)
+    ]
+    kinds = sorted(_infraction_kinds(failure)) + ([] if succeeded(failure.result) else ["goal missed"])
+    data = {
+        "run": failure.run, "condition": trial.condition, "task": trial.scenario.task, "kind": "|".join(kinds),
+        "blame": "|".join(why.blamed),
+    }  # fmt: skip
+    attributes = "".join(f' data-{name}="{escape(value)}"' for name, value in data.items())
+    driven = f"{episode.route_done:.0f} of {episode.route_length:.0f} m in {episode.duration:.0f} s"
+    cause = f"<p>{escape(str(failure.cause))}</p>" if failure.cause else ""
+    blame = f'<p class="blame"><b>To blame</b> {escape(why.blame)}</p>' if why.blame else ""
+    note = f"<small>{escape(why.note)}</small>" if why.note else ""
+    return (
+        f'<article class="card"{attributes}><h3>{escape(trial.key)} <em>{escape(failure.run)}</em></h3>'
+        f"<p>{escape(episode.outcome.value)}; {driven}</p>{cause}<ol>{''.join(infractions)}</ol>{blame}{pictures}{note}"
+        "</article>"
+    )
