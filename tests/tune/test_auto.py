@@ -1,4 +1,4 @@
-"""A search for the constants: the same by seed, gone on with, judged where it was not tuned, and refused where wrong."""
+"""A search for the constants: gone on with where it stopped, judged beside what was before, refused where wrong."""
 
 from __future__ import annotations
 

@@ -112,16 +112,15 @@ def test_a_moved_slider_changes_the_curve_and_is_saved(page: Any, address: str, 
     curve.wait_for(state="attached")
     before = curve.get_attribute("d")
     page.get_by_text("Keep as A").click()
-    thumb = page.locator("[aria-label='longitudinal.cruise.kp'] [role=slider], [aria-label='longitudinal.cruise.kp']")
-    thumb.first.focus()
-    page.keyboard.press("Home")  # the left end: no throttle but the integral's
+    slider = page.locator("[aria-label='longitudinal.cruise.kp']")
+    slider.click(position={"x": 12, "y": 5})  # near its left end
     page.wait_for_function(
-        "([selector, before]) => { const lines = [...document.querySelectorAll(selector)].map(p => p.getAttribute('d'));"
-        " return lines.length > 1 && lines.some(d => d !== before) }",
+        "([selector, before]) => Array.from(document.querySelectorAll(selector), path => path.getAttribute('d'))"
+        ".some((curve, k) => k < 2 && curve !== before)",
         arg=[CURVE, before],
     )
     page.get_by_text("Save", exact=True).click()
     page.get_by_text("saved: caldrive drive --controller").wait_for()
-    assert controller_config(str(tmp_path / "controller.toml"), None).longitudinal.cruise.kp == 0.0
+    assert controller_config(str(tmp_path / "controller.toml"), None).longitudinal.cruise.kp < 0.02
     assert page.complaints == []
     assert {url.partition("://")[2].partition("/")[0] for url in page.asked} == {address.partition("://")[2]}

@@ -53,4 +53,5 @@ class Tune(Configurable):
         require_free_port(self.port)
         print(f"tuning: http://{HOST}:{self.port} (Ctrl-C ends it)", file=sys.stderr, flush=True)
         serve(controller, path, self.port)
-        return Answer({"controller": str(path)}, f"controller: {path}, where it was saved")
+        saved = path if path.is_file() else None
+        return Answer({"controller": saved and str(saved)}, f"saved: {saved}" if saved else "nothing was saved")

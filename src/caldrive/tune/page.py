@@ -126,13 +126,13 @@ class TuningPage:
             ui.button("Keep as A", on_click=self._keep).props("dense outline no-caps")
             ui.button("Back to A", on_click=self._back).props("dense outline no-caps")
             ui.button("Save", on_click=self._save).props("dense no-caps")
-        with ui.expansion("Ziegler-Nichols").classes("w-full"):
+        with ui.expansion("Ziegler-Nichols").props("dense").classes("w-full"):
             self._build_assistant()
         groups: dict[str, list[Constant]] = {}
         for constant in constants(self.controller):
             groups.setdefault(constant.name.rpartition(".")[0] or "general", []).append(constant)
         for name, members in groups.items():
-            with ui.expansion(name, value=name == "longitudinal.cruise").classes("w-full"):
+            with ui.expansion(name, value=name == "longitudinal.cruise").props("dense").classes("w-full"):
                 for constant in members:
                     self._build_slider(constant)
 
