@@ -56,4 +56,4 @@ def test_the_cars_speed_loop_is_stable_below_and_unstable_above() -> None:
     for factor, grows in ((0.8, False), (1.1, True)):
         values = speed_response(factor * found.gain)
         swing = [np.ptp(part) for part in np.split(values[:150], 3)]
-        assert (swing[2] > swing[1]) is grows
+        assert bool(swing[2] > swing[1]) is grows

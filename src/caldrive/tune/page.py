@@ -126,6 +126,7 @@ class TuningPage:
             ui.button("Keep as A", on_click=self._keep).props("dense outline no-caps")
             ui.button("Back to A", on_click=self._back).props("dense outline no-caps")
             ui.button("Save", on_click=self._save).props("dense no-caps")
+            self.spinner = ui.spinner()
         with ui.expansion("Ziegler-Nichols").props("dense").classes("w-full"):
             self._build_assistant()
         groups: dict[str, list[Constant]] = {}
@@ -231,13 +232,17 @@ class TuningPage:
         if self._busy:
             return
         self._busy = True
+        self.spinner.set_visibility(True)
         try:
             while self._stale:
                 self._stale = False
                 self.drives = await self._driven()
                 self._show()
+        except (ValueError, RuntimeError) as error:
+            self.ui.notify(str(error), type="negative", multi_line=True)
         finally:
             self._busy = False
+            self.spinner.set_visibility(False)
 
     async def _driven(self) -> dict[str, Drive]:
         """The drives of A, where it is kept, and of the present setting."""

@@ -85,7 +85,8 @@ def _upward(values: Response) -> Response:
     """Where the values cross their mean upwards, in steps, between which they are interpolated."""
     offset = values - values.mean()
     (before,) = np.nonzero((offset[:-1] < 0) & (offset[1:] >= 0))
-    return before + offset[before] / (offset[before] - offset[before + 1])
+    places: Response = before + offset[before] / (offset[before] - offset[before + 1])
+    return places
 
 
 def proposed(rule: str, ultimate: Ultimate, like: PIDGains) -> PIDGains:
