@@ -47,7 +47,7 @@ class Tune(Configurable):
             page = write_report(findings, self.tune, self.out, path)
             return Answer(report_values(findings, self.tune, path), tuning_table(findings, self.tune, page, path))
 
-        from caldrive.tune.page import HOST, require_free_port, require_nicegui, serve
+        from caldrive.tune.server import HOST, require_free_port, require_nicegui, serve
 
         require_nicegui()
         require_free_port(self.port)

@@ -1,4 +1,5 @@
-"""The page's charts, as options of ECharts: each signal over time, of one drive or of two on top of each other."""
+"""The page's charts, as options of ECharts: each signal over time, of one drive or of two on top of each other; and the
+table of figures above them."""
 
 from __future__ import annotations
 
@@ -9,10 +10,14 @@ from typing import Any
 import numpy as np
 
 from caldrive.driving.comfort import Column
+from caldrive.results import Outcome
+from caldrive.tune.config import CostWeights
+from caldrive.tune.cost import cost
 from caldrive.tune.signals import Drive
 from caldrive.tune.ziegler_nichols import Ultimate
 
 BLUE, ORANGE, GREEN = "#1f5fa8", "#d9822b", "#2e8b57"
+COLUMNS = ("", "time", "|centre|", "RMS jerk", "broken rules", "cost")  # of the table
 DIGITS = 4  # after the point, that the browser gets
 
 
@@ -94,3 +99,18 @@ def _options(title: str, unit: str, series: Sequence[dict[str, Any]]) -> dict[st
         "yAxis": {"type": "value", "name": unit, "scale": True, "axisLabel": small},
         "series": list(series),
     }  # fmt: skip
+
+
+def figures(drive: Drive) -> dict[str, str]:
+    """A drive's row of the table, without its name."""
+    seen, parts = drive.signals, cost(drive)
+    broken = [infraction.kind.value for infraction in drive.result.infractions if infraction.at_fault]
+    reached = drive.result.outcome is Outcome.SUCCESS
+    values = (
+        f"{drive.result.duration:.1f} s" if reached else drive.result.outcome.value,
+        f"{abs(seen.center_distance).mean():.3f} m",
+        f"{float((seen.jerk**2).mean()) ** 0.5:.2f} m/s³",
+        ", ".join(broken) or "none",
+        f"{parts.total(CostWeights()):.3f}",
+    )
+    return dict(zip(COLUMNS[1:], values, strict=True))

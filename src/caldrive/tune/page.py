@@ -1,92 +1,32 @@
 """The page on which a controller is tuned by hand: sliders, live signals, two settings on top of each other (NiceGUI).
 
-It is served on this machine only. Each change drives the maneuver again, in a process of its own, and redraws; changes
-that come meanwhile wait for one drive, not for one each.
+Each change drives the maneuver again, in a process of its own, and redraws; changes that come meanwhile wait for one
+drive, not for one each.
 """
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from caldrive.checks import require_within
 from caldrive.control.controller import ControlConfig
 from caldrive.datatypes import DT
-from caldrive.tune.charts import CHARTS, chart_options, oscillation_options
-from caldrive.tune.config import CostWeights
+from caldrive.tune.charts import CHARTS, COLUMNS, chart_options, figures, oscillation_options
 from caldrive.tune.constants import Constant, constants, values_of, with_values, write_controller
-from caldrive.tune.cost import cost
-from caldrive.tune.maneuvers import MANEUVERS, Maneuver, drive, route
+from caldrive.tune.maneuvers import MANEUVERS, drive, route
 from caldrive.tune.signals import Drive
 from caldrive.tune.ziegler_nichols import RULES, Ultimate, find_ultimate, proposed, speed_response
 
-HOST = "127.0.0.1"
-PORTS = (1024, 65535, 8080)  # least, most, usual
 ROUTES = 3  # of town01 to choose from
-COLUMNS = ("", "time", "|centre|", "RMS jerk", "broken rules", "cost")
 
 
-def require_nicegui() -> Any:
-    """NiceGUI itself. Raises RuntimeError where it is not installed."""
-    try:
-        import nicegui
-    except ImportError as error:
-        raise RuntimeError("found no NiceGUI, wanted it for the page: type pip install 'caldrive[tune]'") from error
-    return nicegui
-
-
-def require_free_port(port: int) -> None:
-    """Raises ValueError where a port cannot be, or somebody has it."""
-    require_within("--port", port, *PORTS)
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except OSError as error:
-            raise ValueError(
-                f"found port {port} taken, wanted a free one: type --port {port + 1 if port < PORTS[1] else PORTS[2]}"
-            ) from error
-
-
-def serve(controller: ControlConfig, path: Path, port: int) -> None:
-    """Serves the page until Ctrl-C. path: the controller's file that it saves. Raises ValueError for a port that is
-    taken, RuntimeError without NiceGUI."""
-    nicegui = require_nicegui()
-    require_free_port(port)
-    nicegui.run.process_pool_start_method = "spawn"
-    nicegui.ui.run(
-        lambda: TuningPage(controller, path).build(), host=HOST, port=port, title="caldrive tune", reload=False,
-        show=False, show_welcome_message=False,
-    )  # fmt: skip
-
-
-def place(name: str) -> Maneuver:
-    """What is driven: a maneuver by its name, or a route by its number."""
-    return MANEUVERS[name] if name in MANEUVERS else route(int(name))
-
-
-def drive_place(name: str, config: ControlConfig) -> Drive:
-    """What the process beside the page does."""
-    return drive(place(name), config)
-
-
-def figures(drive: Drive) -> dict[str, str]:
-    """A drive's row of the table, without its name."""
-    seen, parts = drive.signals, cost(drive)
-    broken = [infraction.kind.value for infraction in drive.result.infractions if infraction.at_fault]
-    reached = drive.result.outcome.name == "SUCCESS"
-    values = (
-        f"{drive.result.duration:.1f} s" if reached else drive.result.outcome.value,
-        f"{abs(seen.center_distance).mean():.3f} m",
-        f"{float((seen.jerk**2).mean()) ** 0.5:.2f} m/s³",
-        ", ".join(broken) or "none",
-        f"{parts.total(CostWeights()):.3f}",
-    )
-    return dict(zip(COLUMNS[1:], values, strict=True))
+@lru_cache(maxsize=8)
+def drive_named(name: str, config: ControlConfig) -> Drive:
+    """What the process beside the page does. name: a maneuver's, or a route's number."""
+    return drive(MANEUVERS[name] if name in MANEUVERS else route(int(name)), config)
 
 
 @dataclass
@@ -198,7 +138,7 @@ class TuningPage:
             if constant.name in values:
                 slider, position = self.sliders[constant.name], constant.position_of(values[constant.name])
                 if constant.kind != "switch" and position > slider.props["max"]:
-                    slider.props(f"max={2 * position:g}")
+                    slider.props["max"] = 2 * position
                 slider.set_value(position)
 
     def _save(self) -> None:
@@ -250,7 +190,7 @@ class TuningPage:
 
         settings = {"A": self.kept, "B": self.controller} if self.kept else {"": self.controller}
         name = self.maneuver
-        return {key: await run.cpu_bound(drive_place, name, config) for key, config in settings.items()}
+        return {key: await run.cpu_bound(drive_named, name, config) for key, config in settings.items()}
 
     def _show(self) -> None:
         for chart, element in zip(CHARTS, self.charts, strict=True):
