@@ -72,7 +72,7 @@ def test_a_cap_is_kept(drives: dict[str, Drive]) -> None:
 
 
 def test_who_steers_badly_leaves_the_lane_and_pays_for_it(drives: dict[str, Drive]) -> None:
-    bad = drive(MANEUVERS["left"], with_values(DEFAULT, {"lateral.max_angle": 0.05, "lateral.left.gain": 0.0}))
+    bad = drive(MANEUVERS["left"], with_values(DEFAULT, {"lateral.left.damping": 1.0, "lateral.straight.damping": 1.0}))
     good, weights = cost(drives["left"]), CostWeights()
     assert bad.result.outcome is not Outcome.SUCCESS
     assert cost(bad).infractions >= 1
