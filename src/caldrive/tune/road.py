@@ -1,4 +1,4 @@
-"""A world of one road with a few things on it, labelled as any world is: a hundred times as fast as real time."""
+"""A world of one road with a few things on it, labelled as any world is: many times as fast as real time."""
 
 from __future__ import annotations
 
