@@ -73,8 +73,7 @@ def _sections(findings: Findings, config: TuneConfig) -> Iterable[str]:
     yield _table(HEADS, cost_rows(findings, config))
     yield (
         f"cost: the sum of the parts, weighted ({weights}); time: share of the time limit; jerk: RMS, in units of 8.37 "
-        "m/s³; centre: mean distance to the centre line, in units of 0.334 m; infractions: at fault, and goals missed. "
-        "The search has not seen the other routes."
+        "m/s³; centre: mean distance to the centre line, in units of 0.334 m; infractions: at fault, and goals missed."
     )
     yield "## Constants that changed"
     yield (
