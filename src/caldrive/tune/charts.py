@@ -37,9 +37,9 @@ CHARTS: tuple[Chart, ...] = (
     Chart("Throttle and brake", "", (0, 1), (("throttle", "throttle", GREEN), ("brake", "brake", ORANGE))),
     Chart("Steering, + left", "", (-1, 1), (("steer", "steer", BLUE),)),
     Chart("Distance to the centre line, + where it lies left", "m", (-0.2, 0.2), (("center_distance", "", BLUE),)),
-    Chart("Relative angle, + left", "°", (-5, 5), (("relative_angle", "", BLUE),)),
+    Chart("Relative angle, + left", "°", (-4, 4), (("relative_angle", "", BLUE),)),
     Chart("Acceleration", "m/s²", (-2, 2), (("acceleration", "", BLUE),)),
-    Chart("Jerk", "m/s³", (-5, 5), (("jerk", "along the road", BLUE), ("lateral_jerk", "across it", ORANGE))),
+    Chart("Jerk", "m/s³", (-4, 4), (("jerk", "along the road", BLUE), ("lateral_jerk", "across it", ORANGE))),
 )
 
 

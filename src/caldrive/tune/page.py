@@ -99,10 +99,13 @@ class TuningPage:
         ui.label("Raises K_p of the speed loop until it oscillates, and takes the gains from K_u and T_u.").classes(
             "text-xs"
         )
-        which = ui.select({"cruise": "cruising", "follow": "following"}, value="cruise", label="PID of")
+        which = ui.select({"cruise": "cruising", "follow": "following"}, value="cruise", label="PID of").classes(
+            "w-full"
+        )
         rule = ui.select(list(RULES), value=next(iter(RULES)), label="Rule").classes("w-full")
         found = ui.label().classes("text-xs").mark("ultimate")
         chart = ui.echart(_empty()).classes("w-full h-48")
+        chart.set_visibility(False)
         ui.button(
             "Find K_u and T_u", on_click=lambda: self._assist(which.value, rule.value, found, chart)
         ).props("dense outline no-caps")  # fmt: skip
@@ -163,6 +166,7 @@ class TuningPage:
             + ", ".join(f"{name} = {value:.3g}" for name, value in values.items())
         )
         chart.options.update(oscillation_options(ultimate, DT))
+        chart.set_visibility(True)
         chart.update()
         self._set({f"longitudinal.{which}.{name}": value for name, value in values.items()})
 
