@@ -99,9 +99,8 @@ class TuningPage:
         ui.label("Raises K_p of the speed loop until it oscillates, and takes the gains from K_u and T_u.").classes(
             "text-xs"
         )
-        which = ui.select({"cruise": "cruising", "follow": "following"}, value="cruise", label="PID of").classes(
-            "w-full"
-        )
+        pids = {"cruise": "cruising", "follow": "following"}
+        which = ui.select(pids, value="cruise", label="PID of").classes("w-full")
         rule = ui.select(list(RULES), value=next(iter(RULES)), label="Rule").classes("w-full")
         found = ui.label().classes("text-xs").mark("ultimate")
         chart = ui.echart(_empty()).classes("w-full h-48")
