@@ -54,11 +54,9 @@ def chart_options(chart: Chart, drives: Mapping[str, Drive]) -> dict[str, Any]:
         line["lineStyle"] = {"width": 1.3, "type": "dashed", "opacity": 0.55}
     options = _options(chart.title, chart.unit, series)
     values = [value for line in series for _, value in line["data"] if value is not None]
-    low, high = chart.least  # beyond them ECharts finds round numbers itself
-    options["yAxis"] |= {
-        "min": low if min(values, default=low) >= low else None,
-        "max": high if max(values, default=high) <= high else None,
-    }
+    low, high = chart.least
+    inside = low <= min(values, default=low) and max(values, default=high) <= high
+    options["yAxis"] |= {"min": low, "max": high} if inside else {"scale": False}  # else in round numbers from 0 on
     return options
 
 
@@ -68,7 +66,7 @@ def oscillation_options(found: Ultimate, dt: float) -> dict[str, Any]:
     for share, color in ((0.5, GREEN), (1.0, BLUE), (1.2, ORANGE)):
         gain = min(found.responses, key=lambda tried: abs(tried - share * found.gain))
         values = found.responses[gain][: round(8 * found.period / dt)]
-        series.append(_line(f"K_p = {gain:.3g}", np.arange(len(values)) * dt, values, color))
+        series.append(_line(f"K_p = {gain:.3g}", np.array([k * dt for k in range(len(values))]), values, color))
     return _options("", "km/h", series)
 
 

@@ -101,7 +101,8 @@ def _constant(name: str, about: str, values: list[Any]) -> Constant:
 
 def _walk(settings: Any, place: str = "") -> Iterator[tuple[str, Any, str]]:
     """Name, value and description of every constant of nested settings."""
-    about = descriptions(type(settings))
+    kind: Any = type(settings)
+    about = descriptions(kind)
     for field in fields(settings):
         name, value = f"{place}{field.name}", getattr(settings, field.name)
         if is_dataclass(value):
