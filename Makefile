@@ -38,7 +38,7 @@ newest:
 	rm -rf out/newest
 	$(PYTHON) -m venv out/newest
 	out/newest/bin/pip install --quiet --disable-pip-version-check "$$(grep '^torch==' constraints.txt)"
-	out/newest/bin/pip install --quiet --disable-pip-version-check '.[explain,hdf5,search]'
+	out/newest/bin/pip install --quiet --disable-pip-version-check '.[explain,hdf5,search,tune]'
 	out/newest/bin/pip freeze
 	out/newest/bin/python scripts/every_verb.py
 

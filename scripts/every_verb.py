@@ -31,6 +31,7 @@ COMMANDS = {
     "--out training",
     "search": "--data recording --model training/model.safetensors --tasks relative_angle --trials 1 --steps 2 "
     "--batch 2 --seeds 1 --joint-steps 1 --workers 1 --out search",
+    "tune": "--auto --trials 2 --routes 0 --maneuvers right --workers 1 --out tune",
     "evaluate": "--data recording --model training/model.safetensors --worst worst.png",
     "see": "labels.png --out see.mp4",
     "explain drive": "--seconds 0.3 --out attention.mp4",

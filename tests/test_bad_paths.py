@@ -14,6 +14,7 @@ from caldrive.cli import main
 DRIVE = ("drive", "--seconds", "0.2", "--no-video", "--out", "out")
 PLACES = ("--from", "0,0", "--to", "9,0")
 BENCHMARK = ("benchmark", "--agent", "oracle")
+TUNE = ("tune", "--port", "1")  # a port that cannot be: what is not refused before it is not served
 INPUTS: dict[str, tuple[str, ...]] = {  # {} stands for the path
     "drive, model": (*DRIVE, "--model", "{}.safetensors"),
     "drive, controller": (*DRIVE, "--agent", "oracle", "--controller", "{}.toml"),
@@ -27,6 +28,8 @@ INPUTS: dict[str, tuple[str, ...]] = {  # {} stands for the path
     "report": ("report", "{}"),
     "collect, town": ("collect", "--out", "out", "--town", "{}.xodr"),
     "train, config": ("train", "--out", "out", "--config", "{}.toml"),
+    "tune, controller": (*TUNE, "--controller", "{}.toml"),
+    "tune, config": (*TUNE, "--config", "{}.toml"),
     "see, picture": ("see", "{}.png", "--out", "out.mp4"),
     "see, video": ("see", "{}.mp4", "--out", "out.mp4"),
     "town, town": ("town", "--plan", "out.png", "--town", "{}.xodr"),
@@ -45,6 +48,8 @@ OUTPUTS: dict[str, tuple[str, ...]] = {
     "evaluate": ("evaluate", "--worst", "{}.png"),
     "see": ("see", "run", "--out", "{}.mp4"),
     "see, values": ("see", "run", "--out", "out.mp4", "--values", "{}.csv"),
+    "tune": (*TUNE, "--out", "{}"),
+    "tune, search": ("tune", "--auto", "--out", "{}"),
     "town, sheet": ("town", "--sheet", "{}.png"),
     "town, plan": ("town", "--plan", "{}.png"),
 }
@@ -68,6 +73,7 @@ SPOILT: dict[str, Callable[[Path], object]] = {
 }  # fmt: skip
 ALIKE = (  # an empty file of settings changes nothing; for a picture the network is loaded first
     ("drive, config", "empty"), ("train, config", "empty"), ("drive, controller", "empty"),
+    ("tune, config", "empty"), ("tune, controller", "empty"),
     ("see, picture", "nested"), ("see, picture", "empty"),
 )  # fmt: skip
 NAMES = {"null byte": "a\0b", "too long": "l" * 300, "in a file": "file/a", "nothing": "gone/a"}

@@ -11,21 +11,19 @@ import optuna
 import pytest
 
 from caldrive.parallel.processes import parallel_map
+from caldrive.parallel.trials import JOURNAL, mend_journal, require_optuna
 from caldrive.search import studies
 from caldrive.search.config import SearchConfig
 from caldrive.search.examples import Source, load_examples
 from caldrive.search.learning import evaluation_step
 from caldrive.search.space import suggest_block
 from caldrive.search.studies import (
-    JOURNAL,
     FinishedTrial,
     TrialJob,
     finished_trials,
     importances,
-    mend_journal,
     missing_jobs,
     open_study,
-    require_optuna,
     run_trial,
 )
 from tests.search.data import TINY_SEARCH, Work

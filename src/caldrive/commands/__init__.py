@@ -24,6 +24,7 @@ from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
 from caldrive.commands.train import Evaluate, Train
+from caldrive.commands.tune import Tune
 
 __all__ = ["GROUPS", "VERBS", "Answer", "command_type", "verb_kind", "verb_words"]
 
@@ -52,6 +53,7 @@ VERBS: Mapping[str, Verb] = {
     "baselines": Verb(Baselines, "Train the paper's other three systems, every variant and seed."),
     "evaluate": Verb(Evaluate, "How well a network sees recorded frames."),
     "search": Verb(Search, "Search for better task blocks of the network."),
+    "tune": Verb(Tune, "Tune the controller: on a page with live signals, or by a search."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
     "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.perception.evaluation.report import Report
     from caldrive.recordings.check import RecordingSummary
     from caldrive.search.run import Findings
+    from caldrive.tune.auto import Findings as Tuning
+    from caldrive.tune.config import TuneConfig
 
 
 def _row(k: int, result: EpisodeResult) -> list[str | Text]:
@@ -235,3 +237,16 @@ def search_table(findings: Findings, page: Path) -> Group:
         )  # fmt: skip
     drive = Text(f"drive: caldrive drive --model {findings.networks['groups'].path}")
     return Group(table, Text(f"report: {page}"), drive)
+
+
+def tuning_table(findings: Tuning, config: TuneConfig, page: Path, controller: Path) -> Group:
+    """Costs before and after, the constants that changed, and where everything is."""
+    from caldrive.tune.report import HEADS, constant_rows, cost_rows
+
+    costs, changes = Table(*HEADS, box=SIMPLE_HEAD), Table("constant", "before", "after", box=SIMPLE_HEAD)
+    for row in cost_rows(findings, config):
+        costs.add_row(*row)
+    for name, old, new in constant_rows(findings):
+        changes.add_row(name, old, new)
+    drive = Text(f"drive: caldrive drive --controller {controller}")
+    return Group(costs, changes, Text(f"report: {page}"), drive)

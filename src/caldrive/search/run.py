@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from caldrive.affordances import BY_NAME, CONDITIONAL
 from caldrive.checks import MOST_WORKERS, require_within, require_writable_folder
-from caldrive.files import locked_folder, read_json, write_whole
+from caldrive.files import locked_folder
 from caldrive.parallel.processes import parallel_map
 from caldrive.parallel.ray_cluster import cluster_map, require_ray
+from caldrive.parallel.trials import claim_folder, mend_journal, require_optuna
 from caldrive.perception.network.checkpoint import load_network
 from caldrive.perception.network.config import BlockConfig, Conditioning
 from caldrive.progress import Progress, silent
@@ -32,15 +31,7 @@ from caldrive.search.best import (
 from caldrive.search.config import SearchConfig
 from caldrive.search.examples import Source, checked_parts, make_features
 from caldrive.search.joint import JointNetwork, network_scores, train_joint
-from caldrive.search.studies import (
-    FinishedTrial,
-    finished_trials,
-    mend_journal,
-    missing_jobs,
-    require_optuna,
-    run_trial,
-    worker_examples,
-)
+from caldrive.search.studies import FinishedTrial, finished_trials, missing_jobs, run_trial, worker_examples
 
 SETTINGS, MODEL = "search.json", "model.safetensors"
 Item = TypeVar("Item")
@@ -113,31 +104,13 @@ def search(config: SearchConfig, source: Source, workers: Workers, progress: Pro
     with locked_folder(source.out):
         try:
             parts = checked_parts(source, config)
-            _claim(source.out, config, [part.digest for part in parts])
+            claim_folder(source.out / SETTINGS, config.decisive() | {"features": [part.digest for part in parts]})
             make_features(source, parts, progress)
             mend_journal(source.out)
             _run_trials(config, source, workers, progress)
             return _findings(config, source, workers, progress)
         finally:
             worker_examples.cache_clear()
-
-
-def _claim(out: Path, config: SearchConfig, digests: list[str]) -> None:
-    """Writes what the trials depend on. Raises ValueError where the folder's trials depend on something else."""
-    path, wanted = out / SETTINGS, config.decisive() | {"features": digests}
-    if not path.is_file():
-        write_whole(path, json.dumps(wanted, indent=1).encode())
-        return
-    try:
-        found = read_json(path.read_bytes(), dict[str, Any])
-    except ValueError as error:
-        raise ValueError(f"found that {path} is damaged ({error}), wanted a search's: give another --out") from error
-    for name, value in wanted.items():
-        if found.get(name) != value:
-            raise ValueError(
-                f"found in {out} a search with {name} {found.get(name)}, wanted {value}: type the same "
-                "settings, --data and --model, or another --out"
-            )
 
 
 def _run_trials(config: SearchConfig, source: Source, workers: Workers, progress: Progress) -> None:

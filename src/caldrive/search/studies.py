@@ -13,9 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from caldrive.affordances import BY_NAME
+from caldrive.parallel.trials import Draw, abandon, open_journal, require_optuna
 from caldrive.perception.network.checkpoint import read_info
 from caldrive.perception.network.config import BlockConfig
 from caldrive.search.config import SearchConfig
@@ -23,7 +22,6 @@ from caldrive.search.examples import Examples, Source, evenly, load_examples
 from caldrive.search.learning import evaluation_step, measured_training, one_thread, training_seed
 from caldrive.search.space import block_of, suggest_block
 
-JOURNAL = "journal.log"
 STARTUP_TRIALS = 5  # that are whole before any is pruned
 FEW = 10  # trials, of which nobody can say what mattered
 DRAW = "draw"  # a trial's own number; Optuna's also counts those that were killed
@@ -63,58 +61,12 @@ def own_block(source: Source, task: str) -> BlockConfig:
     return block
 
 
-def require_optuna() -> Any:
-    """Optuna itself, which keeps quiet. Raises RuntimeError where it is not installed."""
-    try:
-        import optuna
-    except ImportError as error:
-        raise RuntimeError("found no Optuna, wanted it for a search: type pip install 'caldrive[search]'") from error
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    return optuna
-
-
-def mend_journal(out: Path) -> None:
-    """Takes back what a killed process left of a line, and its lock. Only for who has the folder alone."""
-    journal = out / JOURNAL
-    journal.with_name(f"{JOURNAL}.lock").unlink(missing_ok=True)
-    if journal.is_file():
-        content = journal.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):
-            with journal.open("r+b") as file:
-                file.truncate(whole)
-
-
 def open_study(out: Path, config: SearchConfig, task: str, draw: int = 0) -> Any:
     """A task's study, made if need be. draw: the trial that it is asked for next. Raises ValueError where the journal
     is damaged."""
-    optuna, spec = require_optuna(), BY_NAME[task]
-    samplers = {"random": optuna.samplers.RandomSampler, "tpe": optuna.samplers.TPESampler}
-    try:
-        return optuna.create_study(
-            storage=optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(out / JOURNAL))),
-            study_name=task,
-            direction="maximize" if spec.discrete else "minimize",
-            sampler=samplers[config.sampler](seed=_draw_seed(config, draw)),
-            pruner=optuna.pruners.MedianPruner(STARTUP_TRIALS, n_warmup_steps=evaluation_step(config, 2)),
-            load_if_exists=True,
-        )
-    except (ValueError, KeyError, TypeError, AssertionError) as error:
-        raise ValueError(
-            f"found that {out / JOURNAL} is damaged ({error}), wanted a search's journal: give another --out"
-        ) from error
-
-
-def _draw_seed(config: SearchConfig, draw: int) -> int:
-    """Of what a trial draws. The first numbers from seeds that lie side by side would not be independent."""
-    return int(np.random.SeedSequence((config.seed, draw)).generate_state(1)[0])
-
-
-def abandon(study: Any) -> None:
-    """Ends the trials of a study that were killed."""
-    optuna = require_optuna()
-    for trial in study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):
-        study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
+    spec, pruner = BY_NAME[task], {"n_startup_trials": STARTUP_TRIALS, "n_warmup_steps": evaluation_step(config, 2)}
+    direction = "maximize" if spec.discrete else "minimize"
+    return open_journal(out, task, direction, Draw(config.sampler, config.seed, draw), pruner)
 
 
 def missing_jobs(source: Source, config: SearchConfig) -> list[TrialJob]:

@@ -1,0 +1,98 @@
+"""Trials of a search by several processes: Optuna's studies, in a journal that all of them write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from caldrive.files import read_json, write_whole
+
+JOURNAL = "journal.log"
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How a trial's parameters are drawn: by which sampler, from the search's seed and the trial's own number."""
+
+    sampler: Literal["random", "tpe"]
+    seed: int
+    number: int
+
+    @property
+    def own_seed(self) -> int:
+        """The first numbers from seeds that lie side by side would not be independent."""
+        return int(np.random.SeedSequence((self.seed, self.number)).generate_state(1)[0])
+
+
+def require_optuna() -> Any:
+    """Optuna itself, which keeps quiet. Raises RuntimeError where it is not installed."""
+    try:
+        import optuna
+    except ImportError as error:
+        raise RuntimeError("found no Optuna, wanted it for a search: type pip install 'caldrive[search]'") from error
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna
+
+
+def claim_folder(path: Path, wanted: Mapping[str, Any]) -> None:
+    """Writes what a search's trials depend on into a file of its folder. Raises ValueError where the trials that are
+    there depend on something else."""
+    if not path.is_file():
+        write_whole(path, json.dumps(wanted, indent=1).encode())
+        return
+    try:
+        found = read_json(path.read_bytes(), dict[str, Any])
+    except ValueError as error:
+        raise ValueError(f"found that {path} is damaged ({error}), wanted a search's: give another --out") from error
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise ValueError(
+                f"found in {path.parent} a search with {name} {found.get(name)}, wanted {value}: type the same "
+                "settings as before, or another --out"
+            )
+
+
+def mend_journal(out: Path) -> None:
+    """Takes back what a killed process left of a line, and its lock. Only for who has the folder alone."""
+    journal = out / JOURNAL
+    journal.with_name(f"{JOURNAL}.lock").unlink(missing_ok=True)
+    if journal.is_file():
+        content = journal.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            with journal.open("r+b") as file:
+                file.truncate(whole)
+
+
+def open_journal(
+    out: Path, name: str, direction: Literal["minimize", "maximize"], draw: Draw, pruner: Mapping[str, int]
+) -> Any:
+    """A study in a folder's journal, made if need be. draw: of the trial that it is asked for next; pruner: settings of
+    Optuna's MedianPruner. Raises ValueError where the journal is damaged."""
+    optuna = require_optuna()
+    samplers = {"random": optuna.samplers.RandomSampler, "tpe": optuna.samplers.TPESampler}
+    try:
+        return optuna.create_study(
+            storage=optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(out / JOURNAL))),
+            study_name=name,
+            direction=direction,
+            sampler=samplers[draw.sampler](seed=draw.own_seed),
+            pruner=optuna.pruners.MedianPruner(**pruner),
+            load_if_exists=True,
+        )
+    except (ValueError, KeyError, TypeError, AssertionError) as error:
+        raise ValueError(
+            f"found that {out / JOURNAL} is damaged ({error}), wanted a search's journal: give another --out"
+        ) from error
+
+
+def abandon(study: Any) -> None:
+    """Ends the trials of a study that were killed."""
+    optuna = require_optuna()
+    for trial in study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):
+        study.tell(trial.number, state=optuna.trial.TrialState.FAIL)

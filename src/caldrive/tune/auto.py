@@ -1,0 +1,176 @@
+"""A search for the controller's constants with the least cost (Optuna's TPE); one that was stopped goes on.
+
+Each trial draws all searched constants and drives the same maneuvers and routes of town01 in the same order; it is
+pruned where its mean cost so far is worse than the median of earlier trials. What wins is then judged beside the
+controller that the search began with, also on routes that the search has not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from caldrive.checks import MOST_WORKERS, require_within, require_writable_folder
+from caldrive.control.controller import ControlConfig
+from caldrive.files import locked_folder
+from caldrive.parallel.processes import parallel_map
+from caldrive.parallel.trials import Draw, abandon, claim_folder, mend_journal, open_journal, require_optuna
+from caldrive.progress import Progress, silent
+from caldrive.tune.config import TuneConfig
+from caldrive.tune.constants import constants, controller_toml, values_of, with_values
+from caldrive.tune.cost import Cost, cost, mean_cost
+from caldrive.tune.maneuvers import MANEUVERS, Maneuver, drive, route
+
+SETTINGS, STUDY = "tune.json", "constants"
+NUMBER = "number"  # a trial's own; Optuna's also counts those that were killed
+STARTUP_TRIALS = 10  # that are whole before any is pruned
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A controller's mean costs: where it was tuned, and on as many other routes (None for none)."""
+
+    controller: ControlConfig
+    tuned: Cost
+    others: Cost | None
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a search found: the controller before it and the best one, and how many trials there were."""
+
+    before: Judged
+    after: Judged
+    trials: int
+    pruned: int
+
+
+def tune(
+    config: TuneConfig, controller: ControlConfig, out: Path, workers: int = 1, progress: Progress = silent
+) -> Findings:
+    """Does the trials that the folder lacks, and judges the best.
+
+    In the folder lie journal.log (Optuna's) and tune.json. Raises ValueError where what lies there belongs to another
+    search, RuntimeError without Optuna.
+    """
+    require_optuna()
+    require_within("--workers", workers, 1, MOST_WORKERS, 2)
+    require_writable_folder(out)
+    with locked_folder(out):
+        claim_folder(out / SETTINGS, config.decisive() | {"controller": controller_toml(controller)})
+        mend_journal(out)
+        missing = missing_trials(out, config, controller)
+        work, total = partial(run_trial, out, config, controller), config.trials
+        for done, _ in enumerate(parallel_map(work, missing, workers), total - len(missing) + 1):
+            progress(f"trial {done} of {total}", done / total)
+        return _findings(out, config, controller, workers, progress)
+
+
+def tuned_maneuvers(config: TuneConfig) -> list[Maneuver]:
+    """What a search drives: the quick ones first, so that what is bad ends soon."""
+    return [*(MANEUVERS[name] for name in config.maneuvers), *map(route, range(config.routes))]
+
+
+def other_maneuvers(config: TuneConfig) -> list[Maneuver]:
+    """What only judges."""
+    return [route(number) for number in range(config.routes, 2 * config.routes)]
+
+
+def open_study(out: Path, config: TuneConfig, number: int = 0) -> Any:
+    """The study. number: of the trial that it is asked for next."""
+    pruner = {"n_startup_trials": STARTUP_TRIALS, "n_warmup_steps": 0}
+    return open_journal(out, STUDY, "minimize", Draw("tpe", config.seed, number), pruner)
+
+
+def missing_trials(out: Path, config: TuneConfig, controller: ControlConfig) -> list[int]:
+    """The numbers of the trials that are still to be done; the first of all is the controller as it is."""
+    study = open_study(out, config)
+    abandon(study)
+    if not study.get_trials(deepcopy=False):
+        present = values_of(controller)
+        study.enqueue_trial({name: present[name] for name in config.constants})
+    done = {trial.user_attrs[NUMBER] for trial in _finished(study)}
+    return [number for number in range(config.trials) if number not in done]
+
+
+def run_trial(out: Path, config: TuneConfig, controller: ControlConfig, number: int) -> float | None:
+    """What a worker does: one trial. Returns its cost, None where it was pruned."""
+    optuna, study = require_optuna(), open_study(out, config, number)
+    trial = study.ask()
+    trial.set_user_attr(NUMBER, number)
+    tried, costs = with_values(controller, _drawn(trial, config, controller)), list[float]()
+    for step, maneuver in enumerate(tuned_maneuvers(config)):
+        costs.append(cost(drive(maneuver, tried)).total(config.cost))
+        trial.report(sum(costs) / len(costs), step)
+        if trial.should_prune():
+            study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+            return None
+    study.tell(trial, sum(costs) / len(costs))
+    return sum(costs) / len(costs)
+
+
+def _drawn(trial: Any, config: TuneConfig, controller: ControlConfig) -> dict[str, float]:
+    """The constants of a trial, each from its slider's range."""
+    by_name = {constant.name: constant for constant in constants(controller)}
+    return {name: trial.suggest_float(name, by_name[name].low, by_name[name].high) for name in config.constants}
+
+
+def _finished(study: Any) -> list[Any]:
+    states = require_optuna().trial.TrialState
+    trials: list[Any] = study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
+    return [trial for trial in trials if NUMBER in trial.user_attrs]
+
+
+def best_controller(out: Path, config: TuneConfig, controller: ControlConfig) -> ControlConfig:
+    """That of the cheapest whole trial; the controller itself where none was whole."""
+    complete = require_optuna().trial.TrialState.COMPLETE
+    whole = [trial for trial in _finished(open_study(out, config)) if trial.state == complete]
+    if not whole:
+        return controller
+    best = min(whole, key=lambda trial: (trial.value, trial.user_attrs[NUMBER]))
+    return with_values(controller, {name: round(value, 4) for name, value in best.params.items()})
+
+
+def _findings(out: Path, config: TuneConfig, controller: ControlConfig, workers: int, progress: Progress) -> Findings:
+    """Judges the best beside the controller before; what is no better than that is not taken."""
+    judges = [controller, best_controller(out, config, controller)]
+    before, after = _judged(config, judges, workers, progress)
+    if after.tuned.total(config.cost) >= before.tuned.total(config.cost):
+        after = before
+    finished = _finished(open_study(out, config))
+    pruned = sum(trial.state == require_optuna().trial.TrialState.PRUNED for trial in finished)
+    return Findings(before, after, len(finished), pruned)
+
+
+def _judged(config: TuneConfig, controllers: Sequence[ControlConfig], workers: int, progress: Progress) -> list[Judged]:
+    """Controllers, each driven everywhere."""
+    tuned, others = len(tuned_maneuvers(config)), len(other_maneuvers(config))
+    jobs = [(k, place) for k in range(len(controllers)) for place in range(tuned + others)]
+    costs: dict[tuple[int, int], Cost] = {}
+    for done, (job, one) in enumerate(parallel_map(partial(_judge, config, controllers), jobs, workers), 1):
+        costs[job] = one
+        progress(f"before and after, drive {done} of {len(jobs)}", done / len(jobs))
+    return [
+        Judged(
+            controller, mean_cost([costs[k, place] for place in range(tuned)]),
+            mean_cost([costs[k, place] for place in range(tuned, tuned + others)]) if others else None,
+        )
+        for k, controller in enumerate(controllers)
+    ]  # fmt: skip
+
+
+def _judge(config: TuneConfig, controllers: Sequence[ControlConfig], job: tuple[int, int]) -> Cost:
+    """What a worker does: one drive of one controller."""
+    which, place = job
+    maneuvers = list(chain(tuned_maneuvers(config), other_maneuvers(config)))
+    return cost(drive(maneuvers[place], controllers[which]))
+
+
+def changed_constants(findings: Findings) -> dict[str, tuple[Any, Any]]:
+    """The constants that differ, before and after."""
+    before, after = values_of(findings.before.controller), values_of(findings.after.controller)
+    return {name: (before[name], after[name]) for name in before if before[name] != after[name]}

@@ -1,0 +1,118 @@
+"""A search for the constants: gone on with where it stopped, judged beside what was before, refused where wrong."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from caldrive.commands.tune import Tune
+from caldrive.control.presets import DEFAULT, controller_config
+from caldrive.progress import silent
+from caldrive.tune import auto
+from caldrive.tune.auto import missing_trials, run_trial, tune
+from caldrive.tune.config import CostWeights, TuneConfig
+from caldrive.tune.constants import with_values
+from caldrive.tune.maneuvers import Maneuver
+from tests.command_line import refusal
+
+RIGHT = TuneConfig(trials=3, maneuvers=("right",), routes=0, constants=("longitudinal.turn_speed",))
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Drives that cost what the turn speed is off 20 km/h; which speeds were driven."""
+    driven: list[float] = []
+
+    class Costly:
+        def __init__(self, speed: float) -> None:
+            self.speed = speed
+
+        def total(self, _: CostWeights) -> float:
+            return abs(self.speed - 20.0)
+
+    def drive(_: Maneuver, config: Any) -> float:
+        driven.append(config.longitudinal.turn_speed)
+        return driven[-1]
+
+    monkeypatch.setattr(auto, "drive", drive)
+    monkeypatch.setattr(auto, "cost", Costly)
+    monkeypatch.setattr(auto, "mean_cost", lambda costs: costs[0])
+    return driven
+
+
+def test_the_first_trial_is_the_controller_as_it_is(quick: list[float], tmp_path: Path) -> None:
+    tune(replace(RIGHT, trials=1), DEFAULT, tmp_path)
+    assert quick[0] == DEFAULT.longitudinal.turn_speed
+
+
+def test_a_search_finds_what_costs_less(quick: list[float], tmp_path: Path) -> None:
+    found = tune(replace(RIGHT, trials=30), DEFAULT, tmp_path)
+    assert abs(found.after.controller.longitudinal.turn_speed - 20.0) < 2.0
+    assert found.before.controller == DEFAULT
+    assert found.after.controller == with_values(
+        DEFAULT, {"longitudinal.turn_speed": found.after.controller.longitudinal.turn_speed}
+    )
+
+
+def test_what_is_no_better_is_not_taken(quick: list[float], tmp_path: Path) -> None:
+    best = with_values(DEFAULT, {"longitudinal.turn_speed": 20.0})
+    assert tune(replace(RIGHT, trials=8), best, tmp_path).after.controller == best
+
+
+def test_a_search_that_was_stopped_goes_on(quick: list[float], tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    tune(replace(RIGHT, trials=6), DEFAULT, whole)
+    expected = quick[:6]
+    quick.clear()
+    parts.mkdir()
+    missing_trials(parts, RIGHT, DEFAULT)
+    run_trial(parts, RIGHT, DEFAULT, 0)
+    tune(replace(RIGHT, trials=6), DEFAULT, parts)
+    assert quick[:6] == expected
+
+
+def test_a_folder_of_another_search_is_refused(quick: list[float], tmp_path: Path) -> None:
+    tune(replace(RIGHT, trials=1), DEFAULT, tmp_path)
+    with pytest.raises(ValueError, match=r"found in .* a search with seed 0, wanted 1: type the same"):
+        tune(replace(RIGHT, trials=1, seed=1), DEFAULT, tmp_path)
+    with pytest.raises(ValueError, match=r"found in .* a search with controller"):
+        tune(replace(RIGHT, trials=1), with_values(DEFAULT, {"cap": 20.0}), tmp_path)
+
+
+def test_the_command_writes_a_controller_and_the_costs_before_and_after(tmp_path: Path) -> None:
+    answer = Tune(auto=True, out=tmp_path, workers=1, tune=RIGHT).run(silent)
+    assert answer.values["trials"] == 3
+    assert answer.values["after"]["tuned"]["total"] <= answer.values["before"]["tuned"]["total"]
+    page = (tmp_path / "report.md").read_text()
+    assert re.findall(r"^\| where it was tuned \| (\w+) \|", page, re.MULTILINE) == ["before", "after"]
+    found = controller_config(str(tmp_path / "controller.toml"), None).longitudinal.turn_speed
+    changed = answer.values["changed"].get("longitudinal.turn_speed", [15.0, 15.0])
+    assert (changed[0], changed[1]) == (15.0, found)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--trials", "0"), "found --trials 0"),
+        (("--routes", "13"), "found --routes 13"),
+        (("--constants", "wings"), "found --constants wings, wanted some of longitudinal.cruise.kp"),
+        (("--constants", "longitudinal.red_gain", "longitudinal.red_gain"), "found --constants longitudinal.red_gain"),
+        (("--cost.jerk", "-1"), "found --cost.jerk -1"),
+        (("--maneuvers", "fly"), "wanted one of"),
+        (("--controller", "gone.toml"), "found no file gone.toml"),
+        (("--controller", "mine.py:Own"), "mine.py:Own"),
+        (("--workers", "0", "--auto"), "found --workers 0"),
+        (("--port", "80"), "found --port 80, wanted 1024 to 65535"),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    words: tuple[str, ...], expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert expected in refusal(capsys, "tune", *words)
+    assert list(tmp_path.iterdir()) == []
