@@ -54,6 +54,8 @@ def test_a_light_decides_by_its_colour() -> None:
     red, green = (light(12.0, -3.0, state, "a") for state in (LightState.RED, LightState.GREEN))
     far = light(25.0, -3.0, LightState.RED, "b")
     assert subject("red light", lights=(red, far), red_light=1.0) == ("a", "b")
+    same_post = light(12.0, -4.0, LightState.RED, "c")
+    assert subject("red light", lights=(red, same_post), red_light=1.0) == ("a", None)
     assert subject("green light", lights=(green, far)) == ("a", "b")
     assert subject("green light", lights=(red,), red_light=1.0) is None
     assert subject("red light", lights=(green,)) is None

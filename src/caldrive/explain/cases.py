@@ -31,8 +31,10 @@ from caldrive.world.truth.labels import A1, A2, A3, faces, light_area
 
 CAMERA = CameraConfig()
 NEAREST, FARTHEST = 4.0, 30.0  # m ahead at which a thing is looked for that is of no concern
+APART = 8.0  # m between two lights of which one is of no concern: nearer, they may share a post
 BODY = 0.6  # m beside the picture's edge from which on nothing of a person's body is in it
 SHADOW_REACH = 12.0  # m
+ALONG = (0.25, 0.5, 0.75, 1.0)  # places of a shadow, as shares of its length
 Thing = TrafficLight | PedestrianState | VehicleState
 
 
@@ -103,7 +105,9 @@ def _light(is_red: bool) -> Callable[[Moment], Subject | None]:
             return None
         if is_red:
             of_concern = [light for light in of_concern if light.state is not LightState.GREEN]
-        return of_concern[0].id, moment.beside([light for light in truth.lights if _is_seen(light, axle)], of_concern)
+        one = of_concern[0]
+        others = [light for light in truth.lights if _is_seen(light, axle) and _distance(light, one) > APART]
+        return one.id, moment.beside(others, of_concern)
 
     return subject
 
@@ -114,12 +118,16 @@ def _is_seen(light: TrafficLight, axle: Pose) -> bool:
     return math.cos(light.pose.heading) * dx + math.sin(light.pose.heading) * dy > 0
 
 
+def _distance(one: TrafficLight, other: TrafficLight) -> float:
+    return math.hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y)
+
+
 def _person(moment: Moment) -> Subject | None:
     truth = moment.truth
     people, cars = (A2.among(moment.axle, things) for things in (truth.pedestrians, truth.vehicles))
     if len(people) != 1 or cars:
         return None
-    (_, person), *_ = people
+    person = people[0][1]
     return person.id, moment.beside(truth.pedestrians, [person])
 
 
@@ -163,8 +171,9 @@ def _only_shadow_is_seen(moment: Moment, person: PedestrianState, thrown: tuple[
     slope = math.tan(math.radians(CAMERA.fov / 2))
     if math.hypot(ahead, left) > SHADOW_REACH or abs(left) < ahead * slope + BODY * math.hypot(1, slope):
         return False
-    end_ahead, end_left = moment.seen_at(Pose(person.pose.x + thrown[0], person.pose.y + thrown[1], 0.0))
-    return end_ahead > 1.0 and abs(end_left) < end_ahead * slope
+    along = [(person.pose.x + share * thrown[0], person.pose.y + share * thrown[1]) for share in ALONG]
+    places = [moment.seen_at(Pose(*place, 0.0)) for place in along]
+    return any(ahead > 1.0 and abs(left) < ahead * slope for ahead, left in places)
 
 
 SITUATIONS = (
@@ -203,7 +212,8 @@ def _moments(
         history.append(world.scene())
         truth = step.truth
         moment = Moment(truth, moved(truth.ego.pose, world.vehicle.front_axle), world.town, scenario.weather)
-        progress("driving", min(1.0, truth.route_done / truth.route_length))
+        done = max(truth.route_done / truth.route_length, truth.time / scenario.time_limit)
+        progress("driving", min(1.0, done))
         for situation in SITUATIONS if len(history) == span else ():
             if found := situation.subject(moment):
                 label = truth.affordances.speed_sign if situation.affordance == "speed_sign" else None

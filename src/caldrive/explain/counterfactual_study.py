@@ -39,6 +39,7 @@ from caldrive.scenarios import Scenario
 from caldrive.visualization.gauges import BACKGROUND, write
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import CameraRig
+from caldrive.world.town import load_town
 
 CROSSING = 4.0  # times as often as usual people cross the road: else a hazard by a person is rare
 CAPTION, GAP = 22, 4  # pixels
@@ -105,20 +106,20 @@ def _seen(
     """The cases of all episodes as the network sees them, up to so many of each situation."""
     world, agent = set_up(AgentSettings(agent="oracle"))
     assert isinstance(world, EmbeddedWorld)
-    counts, rig = Counter[str](), None
-    with closing(world):
+    counts = Counter[str]()
+    with closing(world), closing(CameraRig(load_town(scenarios[0].town))) as rig:
+        studio = Studio(rig, network, layer)
         for episode, scenario in enumerate(scenarios):
             driving, drawing = (_part(progress, episode, len(scenarios), half) for half in (0, 1))
             there = replace(scenario, crossing=CROSSING)
             found = find_cases(
                 world, agent, there, episode=episode, span=network.span, seed=seed, progress=driving
             )  # fmt: skip
-            rig = rig or CameraRig(world.town)
             for k, case in enumerate(found):
                 drawing("drawing", k / len(found))
                 if counts[case.situation.name] < cases:
                     counts[case.situation.name] += 1
-                    yield see(Studio(rig, network, layer), case)
+                    yield see(studio, case)
 
 
 def _part(progress: Progress, episode: int, episodes: int, half: int) -> Progress:
