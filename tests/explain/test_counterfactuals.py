@@ -43,10 +43,12 @@ def test_every_situation_has_a_change_and_a_control_needs_another_thing() -> Non
 def test_an_effect_is_the_mean_over_cases_with_the_answers_that_flip() -> None:
     change = INTERVENTIONS[0]
     blank = np.zeros((2, 2, 3), np.uint8)
-    found = [
-        Counterfactual(case("red light", k), change, *map(probability, replies), different(blank, blank), blank)
-        for k, replies in enumerate([(0.9, 0.1, 0.8), (0.7, 0.6, 0.2)])
-    ]
+
+    def changed(episode: int, before: float, after: float, now: float) -> Counterfactual:
+        replies = probability(before), probability(after), probability(now)
+        return Counterfactual(case("red light", episode), change, *replies, different(blank, blank), blank)
+
+    found = [changed(0, 0.9, 0.1, 0.8), changed(1, 0.7, 0.6, 0.2)]
     (effect,) = effects(found)
     assert (effect.cases, effect.episodes, effect.flipped, effect.flipped_now) == (2, 2, 1, 1)
     assert (effect.before, effect.after, effect.difference) == pytest.approx((0.8, 0.35, -0.45))

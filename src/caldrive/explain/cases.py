@@ -54,6 +54,11 @@ class Moment:
         x, y = to_local(eye, np.array([(pose.x, pose.y)]))[0].tolist()
         return x, y
 
+    def in_the_way(self) -> tuple[list[PedestrianState], list[VehicleState]]:
+        """People and cars whose centres are where a hazard is."""
+        people, cars = A2.among(self.axle, self.truth.pedestrians), A2.among(self.axle, self.truth.vehicles)
+        return [person for _, person in people], [car for _, car in cars]
+
     def beside(self, things: Sequence[Thing], concern: Sequence[Thing]) -> str | None:
         """The id of the nearest in view of some things that are of no concern."""
         free = [(self.seen_at(thing.pose), thing) for thing in things if thing not in concern]
@@ -123,20 +128,17 @@ def _distance(one: TrafficLight, other: TrafficLight) -> float:
 
 
 def _person(moment: Moment) -> Subject | None:
-    truth = moment.truth
-    people, cars = (A2.among(moment.axle, things) for things in (truth.pedestrians, truth.vehicles))
+    people, cars = moment.in_the_way()
     if len(people) != 1 or cars:
         return None
-    person = people[0][1]
-    return person.id, moment.beside(truth.pedestrians, [person])
+    return people[0].id, moment.beside(moment.truth.pedestrians, people)
 
 
 def _car_in_the_way(moment: Moment) -> Subject | None:
-    truth = moment.truth
-    people, cars = (A2.among(moment.axle, things) for things in (truth.pedestrians, truth.vehicles))
+    truth, (people, cars) = moment.truth, moment.in_the_way()
     if people or len(cars) != 1 or not truth.affordances.hazard_stop:
         return None
-    return cars[0][1].id, moment.beside(truth.vehicles, [car for _, car in A3.among(moment.axle, truth.vehicles)])
+    return cars[0].id, moment.beside(truth.vehicles, [car for _, car in A3.among(moment.axle, truth.vehicles)])
 
 
 def _car_ahead(moment: Moment) -> Subject | None:

@@ -86,29 +86,33 @@ class Intervention:
         return [painted.render(state, [camera])[0] for state in states]
 
 
+def _control(situation: str, name: str, change: Change) -> Intervention:
+    """Something done to what is of no concern."""
+    return Intervention(situation, name, change, control=True, of_other=True)
+
+
 UNCHANGED = Intervention("", "as it was")
 AWAY, NO_SHADOW, ONLY_SHADOW = "the person is away", "the shadow is away", "only the shadow is there"
 ONLY_LEGS, ONLY_TORSO, NO_OUTLINES = "only the legs are there", "only the torso is there", "the road has no outlines"
-OTHER = {"control": True, "of_other": True}
 INTERVENTIONS = (
     Intervention("red light", "the lamp is green", _lamp(LightState.GREEN)),
     Intervention("red light", NO_OUTLINES, paint=lambda town, id: without_outlines()),
     Intervention(
         "red light", "the road has no centre line", paint=lambda town, id: without_center_lines(), control=True
     ),
-    Intervention("red light", "another lamp has the other colour", _other_color, **OTHER),
+    _control("red light", "another lamp has the other colour", _other_color),
     Intervention("green light", "the lamp is red", _lamp(LightState.RED)),
-    Intervention("green light", "another lamp has the other colour", _other_color, **OTHER),
+    _control("green light", "another lamp has the other colour", _other_color),
     Intervention("hazard by a person", AWAY, _without_person),
     Intervention("hazard by a person", NO_SHADOW, _only(Shown.LEGS | Shown.TORSO)),
     Intervention("hazard by a person", ONLY_SHADOW, _only(Shown.SHADOW)),
     Intervention("hazard by a person", ONLY_LEGS, _only(Shown.LEGS)),
     Intervention("hazard by a person", ONLY_TORSO, _only(Shown.TORSO)),
-    Intervention("hazard by a person", "another person is away", _without_person, **OTHER),
+    _control("hazard by a person", "another person is away", _without_person),
     Intervention("hazard by a car", "the car is away", _without_car),
-    Intervention("hazard by a car", "another car is away", _without_car, **OTHER),
+    _control("hazard by a car", "another car is away", _without_car),
     Intervention("car ahead", "the car is away", _without_car),
-    Intervention("car ahead", "another car is away", _without_car, **OTHER),
+    _control("car ahead", "another car is away", _without_car),
     Intervention("speed sign", "the sign has the next number", paint=_other_number),
     Intervention("shadow of a person out of view", NO_SHADOW, _only(Shown.LEGS | Shown.TORSO)),
 )

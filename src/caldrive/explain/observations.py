@@ -47,7 +47,8 @@ def lower_part(person: Mask) -> Mask:
     """The lower third of a person."""
     rows = np.flatnonzero(person.any(axis=1))
     first = rows[-1] + 1 - round(LOWER * (rows[-1] + 1 - rows[0]))
-    return person & (np.arange(len(person))[:, None] >= first)
+    result: Mask = person & (np.arange(len(person))[:, None] >= first)
+    return result
 
 
 def _attention_on(seen: Seen, mask: Mask) -> float:

@@ -73,11 +73,9 @@ def seen_actors(
     meshes, classes, bodies, shadows = np.array(kinds, np.int32).reshape(-1, 4).T.copy()
     table = np.array(rows, np.float32).reshape(-1, 10 + COLORS + 8)
     has_body, has_shadow = bodies > 0, shadows > 0
-    looks = np.split(table[has_body, : 10 + COLORS], (7, 10), axis=1)
-    return Actors(
-        meshes[has_body], classes[has_body], *(np.ascontiguousarray(look) for look in looks),
-        np.ascontiguousarray(table[has_shadow, 10 + COLORS :]),
-    )  # fmt: skip
+    *looks, _ = np.split(table[has_body], (7, 10, 10 + COLORS), axis=1)
+    parts = (*looks, table[has_shadow, 10 + COLORS :])
+    return Actors(meshes[has_body], classes[has_body], *(np.ascontiguousarray(part) for part in parts))
 
 
 def _in_view(frustum: Frustum, actors: Iterable[Actor], far: float) -> Iterator[tuple[Actor, float]]:
