@@ -80,7 +80,7 @@ def main(weather: int = 1) -> None:
         for _ in range(STEPS):
             observation = world.step(agent.act(observation))
             laps.note("(the world)")
-            draw_in_steps(rig, world._scene(), laps)
+            draw_in_steps(rig, world.scene(), laps)
     for step, milliseconds in laps.steps.items():
         if not step.startswith("("):
             print(f"{step:30s} {median(milliseconds):.3f} ms")

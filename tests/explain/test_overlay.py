@@ -53,5 +53,5 @@ def test_a_still_says_what_was_asked_and_how_far_back_the_block_looks() -> None:
     assert one.shape == (160 + BAR, 320, 3)
     assert (one[:160, 100:] != 0).any()
     assert (one[160:, 112:] != two[160:, 112:]).any()
-    assert said(Attention(reply, (MAP,), (0,))) == "red light: 25 %"
-    assert said(Attention(Reply("relative angle", None, -0.2, 0), (MAP,), (0,))) == "relative angle: -0.20"
+    assert said(reply) == "red light: 25 %"
+    assert said(Reply("relative angle", None, -0.2, 0)) == "relative angle: -0.20"

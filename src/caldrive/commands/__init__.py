@@ -18,7 +18,7 @@ from caldrive.commands.baselines import Baselines
 from caldrive.commands.benchmark import Benchmark, Replay, Report
 from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
-from caldrive.commands.explain import Blame, ExplainDrive, ExplainPictures, ExplainRecording
+from caldrive.commands.explain import Blame, ExplainCounterfactuals, ExplainDrive, ExplainPictures, ExplainRecording
 from caldrive.commands.search import Search
 from caldrive.commands.see import See
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
@@ -46,6 +46,9 @@ VERBS: Mapping[str, Verb] = {
     "explain drive": Verb(ExplainDrive, "Film where the network looks in a drive."),
     "explain pictures": Verb(ExplainPictures, "Film where it looks in your own video or pictures."),
     "explain recording": Verb(ExplainRecording, "Draw where it looks in recorded frames, and measure it."),
+    "explain counterfactuals": Verb(
+        ExplainCounterfactuals, "Change one thing in a picture, and see what it says then."
+    ),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
     "convert": Verb(Convert, "Write a recording in a format that others' code reads."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +12,7 @@ from tyro.conf import UseAppendAction
 from caldrive.commands.answer import Answer, Configurable, Output
 from caldrive.driving.settings import EpisodeSettings, SeeSettings
 from caldrive.progress import Progress
+from caldrive.scenarios import Scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +30,7 @@ class Blame(Output):
 
     def run(self, progress: Progress) -> Answer:
         """Drives what is missing; answers with how many failures each affordance is to blame for."""
-        from caldrive.commands.tables import blame_table
+        from caldrive.commands.explain_tables import blame_table
         from caldrive.explain.blame import FOLDER, blame
 
         found, run = blame(self.folder, self.out or self.folder / FOLDER, self.workers, self.ray, progress)
@@ -109,7 +110,7 @@ class ExplainRecording(Output):
         """Draws the sheet; answers with the figures."""
         from caldrive.agents.rows import model_path
         from caldrive.checks import require_within, require_writable_file
-        from caldrive.commands.tables import attention_table
+        from caldrive.commands.explain_tables import attention_table
         from caldrive.explain.recorded import contact_sheet, figures
         from caldrive.explain.situations import find_examples
         from caldrive.files import write_whole
@@ -128,3 +129,79 @@ class ExplainRecording(Output):
         results = figures(network, measured, self.layer, self.seed, progress) if self.measured else []
         values = {"out": str(self.out), "figures": [asdict(one) for one in results]}
         return Answer(values, attention_table(results, self.out))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainCounterfactuals(Output):
+    """Change one thing in what the oracle's drives show (a lamp, a person, a car, a sign, the road's outlines) and see
+    the prediction change; and test the paper's three observations on attention."""
+
+    town: str = "town01"
+    """town01, town02, random:SEED, random-wide:SEED or an OpenDRIVE file."""
+    weather: UseAppendAction[tuple[int, ...]] = ()
+    """One of CARLA's weathers, 1 to 14; may be given again. Without it those of the training: 1, 3, 6 and 8."""
+    episodes: int = 20
+    """Episodes to drive, in these weathers in turn."""
+    cases: int = 40
+    """Moments of each situation, at most."""
+    cars: int | None = None
+    """Other cars; without it what the benchmark's dynamic task prescribes."""
+    people: int | None = None
+    """Pedestrians; likewise."""
+    seconds: float | None = None
+    """Ends every episode after so many simulated seconds."""
+    seed: int = 0
+    """Decides everything random."""
+    model: Path | None = None
+    """The network, a .safetensors file; without it the one in the package."""
+    layer: Literal["coarse", "fine"] = "coarse"
+    """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
+    out: Path = Path("out/counterfactuals.png")
+    """The sheet, a PNG file."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Drives and changes; answers with the effects and the verdicts."""
+        from caldrive.agents.rows import model_path
+        from caldrive.checks import require_within, require_writable_file
+        from caldrive.commands.explain_tables import study_table
+        from caldrive.explain.counterfactual_study import sheet, study
+        from caldrive.files import write_whole
+        from caldrive.perception.inference.predictor import NetworkPerception
+        from caldrive.perception.network.checkpoint import load_network
+
+        require_writable_file(self.out, "--out", ".png")
+        require_within("--cases", self.cases, 1, 1000, 40)
+        path = model_path(self.model)
+        network, _ = load_network(path)
+        scenarios = self.scenarios()
+        at_the_wheel = NetworkPerception(path, threads=1, watchdog=False)
+        found = study(
+            network, at_the_wheel, scenarios, cases=self.cases, layer=self.layer, seed=self.seed, progress=progress
+        )
+        write_whole(self.out, sheet(found.shown))
+        values = {
+            "out": str(self.out), "found": found.found, "effects": [asdict(one) for one in found.effects],
+            "observations": [asdict(one) | {"verdict": one.verdict} for one in found.findings],
+            "at_the_wheel": asdict(found.gap),
+        }  # fmt: skip
+        return Answer(values, study_table(found, self.out))
+
+    def scenarios(self) -> list[Scenario]:
+        """What is driven: the dynamic task's routes in turn. Raises ValueError for numbers that cannot be."""
+        from caldrive.benchmark.suites import TRAINING_WEATHERS
+        from caldrive.checks import require_within
+        from caldrive.driving.choice import chosen_scenarios
+
+        weathers = self.weather or TRAINING_WEATHERS
+        for weather in weathers:
+            require_within("--weather", weather, 1, 14, 1)
+        require_within("--episodes", self.episodes, 1, 1000, 20)
+        settings = EpisodeSettings(
+            town=self.town, task="navigation-dynamic", cars=self.cars, people=self.people, seconds=self.seconds,
+            seed=self.seed,
+        )  # fmt: skip
+        routes = chosen_scenarios(settings, self.episodes)
+        return [
+            replace(scenario, weather=weathers[k % len(weathers)], seed=self.seed + k)
+            for k, scenario in enumerate(routes)
+        ]

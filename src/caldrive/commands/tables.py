@@ -21,8 +21,6 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.benchmark.suites import TrialResult
     from caldrive.driving.drive import DriveReport
     from caldrive.driving.speed import WorldTiming
-    from caldrive.explain.blame import Blame
-    from caldrive.explain.recorded import Figures
     from caldrive.perception.evaluation.report import Report
     from caldrive.recordings.check import RecordingSummary
     from caldrive.search.run import Findings
@@ -189,35 +187,6 @@ def _confusion(name: str, report: Report) -> Table:
     for c, row, iou in zip(classes, report.confusion[name], report.class_iou[name], strict=True):
         table.add_row(str(c), *map(str, row), _figure(iou, 100))
     return table
-
-
-def blame_table(blame: Blame, name: str, episodes: int) -> Group:
-    """A row for each affordance, and for what none of them is to blame for."""
-    failures = len(blame.failures)
-    table = Table("affordance", "rescued by its truth", "fail with it alone seen", box=SIMPLE_HEAD)
-    for spec in SPECS:
-        table.add_row(spec.title, str(len(blame.rescued[spec.name])), str(len(blame.spoilt[spec.name])))
-    table.add_row("all of them", str(len(blame.rescued["all"])), "")
-    table.add_row("controller and world", "", str(len(blame.rest)))
-    return Group(Text(f"{name}: {failures} of {episodes} episodes went wrong"), table)
-
-
-def attention_table(figures: Sequence[Figures], out: Path) -> Group:
-    """How true the attention is, a row for each situation."""
-    said = Text(f"attention: {out}")
-    if not figures:
-        return Group(said)
-    heads = ("situation", "frames", "points at it", "on it", "its area", "deletion", "insertion", "new weights")
-    table = Table(*heads, box=SIMPLE_HEAD)
-    for one in figures:
-        where = ["" if value is None else f"{100 * value:.1f} %" for value in (one.pointing, one.energy, one.area)]
-        curves = (one.network, one.random, one.centred)
-        lost = " ".join(f"{curve.deletion:.2f}" for curve in curves)
-        won = " ".join(f"{curve.insertion:.2f}" for curve in curves)
-        cascade = " ".join(f"{value:.2f}" for value in one.cascade)
-        table.add_row(one.situation, str(one.examples), *where, lost, won, cascade)
-    note = "deletion, insertion: of the attention, of random maps, of the middle; new weights: rank correlation with it"
-    return Group(table, Text(note), said)
 
 
 def search_table(findings: Findings, page: Path) -> Group:

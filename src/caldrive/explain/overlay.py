@@ -15,7 +15,7 @@ from PIL import Image as Picture
 from PIL import ImageDraw
 
 from caldrive.datatypes import Image
-from caldrive.explain.gradcam import Attention, Map, upsampled
+from caldrive.explain.gradcam import Attention, Map, Reply, upsampled
 from caldrive.visualization.gauges import BACKGROUND, MUTED, Draw, write
 
 GREEN, YELLOW, RED = (46, 160, 67), (250, 204, 21), (220, 38, 38)
@@ -60,15 +60,14 @@ def explained(image: Image, attention: Attention, scale: float, *, width: int = 
     picture = Picture.new("RGB", (width, height + BAR), BACKGROUND)
     picture.paste(Picture.fromarray(overlay(large, attention.now, scale, attention.reply.probability)))
     draw = ImageDraw.Draw(picture)
-    write(draw, (8, height + BAR / 2), said(attention), 14)
+    write(draw, (8, height + BAR / 2), said(attention.reply), 14)
     if len(attention.maps) > 1:
         _draw_bar(draw, attention, (width - 208, height + 5, width - 8, height + BAR - 5))
     return np.asarray(picture)
 
 
-def said(attention: Attention) -> str:
+def said(reply: Reply) -> str:
     """What is asked, and what the network says."""
-    reply = attention.reply
     if reply.probability is not None:
         return f"{reply.label}: {100 * reply.probability:.0f} %"
     return f"{reply.label}: {reply.value:.2f}"

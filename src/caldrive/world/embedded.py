@@ -106,11 +106,11 @@ class EmbeddedWorld:
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
         """What cameras on the ego see now, (H, W, 3) each."""
-        return self._camera().render(self._scene(), mounts)
+        return self._camera().render(self.scene(), mounts)
 
     def semantic_images(self, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
         """What each pixel of `images` shows, (H, W) each, as numbers of `Semantic`."""
-        return self._camera().render_semantics(self._scene(), mounts)
+        return self._camera().render_semantics(self.scene(), mounts)
 
     def labels_at(self, mount: CameraConfig) -> Affordances:
         """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
@@ -120,7 +120,8 @@ class EmbeddedWorld:
         """What other commands would ask of such a car, where others could be given."""
         return self._current.labels.other_commands_at(mount, self._current.state)
 
-    def _scene(self) -> SceneState:
+    def scene(self) -> SceneState:
+        """What `images` shows now, beside the town."""
         state = self._current.state
         return SceneState(
             weather=self._current.scenario.weather,

@@ -11,7 +11,15 @@ from caldrive.world.rendering.actors import Actors
 from caldrive.world.rendering.light import Light
 from caldrive.world.scene.cars import GLOWING, SHAPES, CarPart, car_mesh, far_car_mesh
 from caldrive.world.scene.meshes import merge
-from caldrive.world.scene.people import HIP_HEIGHT, SHOULDER_HEIGHT, Limb, far_person_mesh, person_mesh
+from caldrive.world.scene.people import (
+    HIP_HEIGHT,
+    SHOULDER_HEIGHT,
+    Limb,
+    Shown,
+    far_person_mesh,
+    half_of,
+    person_mesh,
+)
 
 PAINT, GLASS = int(CarPart.PAINT), int(CarPart.GLASS)
 LEFT_LEG, RIGHT_LEG, LEFT_ARM, RIGHT_ARM = (
@@ -41,8 +49,9 @@ class ActorMeshes(NamedTuple):
 
 
 def actor_meshes() -> ActorMeshes:
-    """Of each shape of car the fine and the coarse one, then those of people."""
+    """Of each shape of car the fine and the coarse one, then those of people, whole, their legs and their torsos."""
     meshes = [make(shape) for shape in SHAPES for make in (car_mesh, far_car_mesh)] + [person_mesh(), far_person_mesh()]
+    meshes += [half_of(mesh, half) for half in (Shown.LEGS, Shown.TORSO) for mesh in meshes[-2:]]
     whole = merge(meshes)
     vertices = whole.vertices
     parts = np.stack((vertices["slot"], vertices["spare"]), axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
@@ -17,6 +17,7 @@ from caldrive.world.scene import cars, people
 from caldrive.world.scene.cars import SHAPES
 from caldrive.world.scene.ground import KERB_HEIGHT
 from caldrive.world.scene.meshes import RGB
+from caldrive.world.scene.people import Shown
 
 STRIDE = 0.75  # m of one step
 SWING = 0.30  # rad of the limbs at 1 m/s
@@ -27,12 +28,15 @@ CAR_FAR, PERSON_FAR = 160.0, 80.0  # m beyond which nobody is drawn
 REACH = 6.0  # m around an actor in which something of it, or of its shadow, may be in view
 BLACK: RGB = (0, 0, 0)
 COLORS = 12  # numbers of an actor's four colours
+PEOPLE = 2 * len(SHAPES)  # the first mesh of people
+BODIES = {Shown.LEGS | Shown.TORSO: PEOPLE, Shown.LEGS: PEOPLE + 2, Shown.TORSO: PEOPLE + 4}
+NOTHING_HIDDEN: Mapping[str, Shown] = {}
 Row = tuple[float, ...]
 Actor = TypeVar("Actor", VehicleState, PedestrianState)
 
 
 class Actors(NamedTuple):
-    """N cars and people."""
+    """N cars and people, and M of their shadows."""
 
     meshes: Integers
     """(N,), as in `actor_meshes`."""
@@ -46,25 +50,32 @@ class Actors(NamedTuple):
     colors: Floats
     """(N, COLORS), of slots 1 to 4, in [0, 1]."""
     shadows: Floats
-    """(N, 8): x, y, heading, height, half length, half width (m), darkness underneath, height of the ground."""
+    """(M, 8): x, y, heading, height, half length, half width (m), darkness underneath, height of the ground."""
 
 
 def seen_actors(
-    frustum: Frustum, zoom: float, vehicles: Iterable[VehicleState], pedestrians: Iterable[PedestrianState]
-) -> Actors:
-    """Those in view. zoom: how many times as far as in a small picture they are seen."""
-    kinds, rows = list[tuple[int, int]](), list[Row]()
+    frustum: Frustum, zoom: float, vehicles: Iterable[VehicleState], pedestrians: Iterable[PedestrianState],
+    shown: Mapping[str, Shown] = NOTHING_HIDDEN,
+) -> Actors:  # fmt: skip
+    """Those in view. zoom: how many times as far as in a small picture they are seen. shown: what is drawn of people,
+    by id, where that is not the whole."""
+    kinds, rows = list[tuple[int, int, bool, bool]](), list[Row]()
     for vehicle, away in _in_view(frustum, vehicles, CAR_FAR * zoom):
         look = _car_look(vehicle.id)
-        kinds.append((2 * look[0] + (away > CAR_DETAIL * zoom), int(Semantic.VEHICLE)))
+        kinds.append((2 * look[0] + (away > CAR_DETAIL * zoom), int(Semantic.VEHICLE), True, True))
         rows.append(_car_row(vehicle, *look))
     for person, away in _in_view(frustum, pedestrians, PERSON_FAR * zoom):
-        kinds.append((2 * len(SHAPES) + (away > PERSON_DETAIL * zoom), int(Semantic.PERSON)))
+        part = shown.get(person.id, Shown.WHOLE)
+        body = BODIES.get(part & ~Shown.SHADOW)
+        mesh = (body or PEOPLE) + (away > PERSON_DETAIL * zoom)
+        kinds.append((mesh, int(Semantic.PERSON), body is not None, Shown.SHADOW in part))
         rows.append(_person_row(person, *_person_look(person.id)))
-    meshes, classes = np.array(kinds, np.int32).reshape(-1, 2).T.copy()
+    meshes, classes, bodies, shadows = np.array(kinds, np.int32).reshape(-1, 4).T.copy()
     table = np.array(rows, np.float32).reshape(-1, 10 + COLORS + 8)
-    parts = np.split(table, (7, 10, 10 + COLORS), axis=1)
-    return Actors(meshes, classes, *(np.ascontiguousarray(part) for part in parts))
+    has_body, has_shadow = bodies > 0, shadows > 0
+    *looks, _ = np.split(table[has_body], (7, 10, 10 + COLORS), axis=1)
+    parts = (*looks, table[has_shadow, 10 + COLORS :])
+    return Actors(meshes[has_body], classes[has_body], *(np.ascontiguousarray(part) for part in parts))
 
 
 def _in_view(frustum: Frustum, actors: Iterable[Actor], far: float) -> Iterator[tuple[Actor, float]]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +14,7 @@ from caldrive.compiled import Integers
 from caldrive.world.rendering.light import Light, light_of, packed_shadows
 from caldrive.world.rendering.texturing import Materials, Texels, packed, texels
 from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.scene.appearance import Appearance
+from caldrive.world.scene.appearance import Appearance, RoadPaint
 from caldrive.world.scene.scenery import Prop
 from caldrive.world.scene.shadows import Bounds, shadow_bounds, shadow_heights
 from caldrive.world.scene.sky import panorama
@@ -29,6 +31,7 @@ class Atmosphere:
         self.roads, self.scenery, self.appearance = roads, scenery, appearance
         self._lights: dict[tuple[int, Bounds], Light] = {}
         self._materials: dict[int, Materials] = {}
+        self._skies: dict[int, Texels] = {}
         self._shadows: dict[tuple[float, Bounds], Integers] = {}  # by the sun's altitude, and what they cover
 
     def in_weather(self, id: int, x: float, y: float) -> tuple[Light, Materials]:
@@ -57,15 +60,23 @@ class Atmosphere:
 
     def _made(self, id: int) -> Materials:
         current, paint = weather(id), self.appearance.paint
-        light = lighting(current, self.appearance.sun_azimuth)
-        sky = packed(panorama(current, light, zlib.crc32(self.roads.name.encode())))
+        if id not in self._skies:
+            light = lighting(current, self.appearance.sun_azimuth)
+            self._skies[id] = packed(panorama(current, light, zlib.crc32(self.roads.name.encode())))
         colors = [(*color, 0.0) for color in (paint.center, paint.edge, paint.asphalt)]
-        return Materials(layers(), sky, np.array([*colors, paint.widths], np.float32))
+        return Materials(layers(), self._skies[id], np.array([*colors, paint.widths], np.float32))
+
+    def with_paint(self, paint: RoadPaint) -> Atmosphere:
+        """The same with other road markings; it shares lights and skies."""
+        other = copy.copy(self)
+        other.appearance, other._materials = replace(self.appearance, paint=paint), {}
+        return other
 
     def close(self) -> None:
         """Forgets all of them."""
         self._lights.clear()
         self._materials.clear()
+        self._skies.clear()
         self._shadows.clear()
 
 

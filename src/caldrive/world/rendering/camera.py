@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -18,9 +19,11 @@ from caldrive.world.rendering.occlusion import Cells, OcclusionMap
 from caldrive.world.rendering.overlays import Lamps
 from caldrive.world.rendering.picture import Canvas, Drawn, Overlays
 from caldrive.world.rendering.pinhole import PinholeCamera, camera_on
+from caldrive.world.rendering.repainting import Repainting
 from caldrive.world.rendering.spots import Scene
 from caldrive.world.rendering.tiles import Faces, ViewCell
 from caldrive.world.rendering.town_mesh import town_grid, town_vertices
+from caldrive.world.scene.people import Shown
 from caldrive.world.scene.sky import dome_triangles, rain_streaks
 from caldrive.world.town import Town
 
@@ -44,6 +47,8 @@ class SceneState:
     """What the traffic lights show, by LightPost.id; others are dark."""
     time: float = 0.0
     """s, moves the rain."""
+    shown: Mapping[str, Shown] = field(default_factory=dict)
+    """What is drawn of people, by PedestrianState.id; others are drawn whole."""
 
 
 class CameraRig:
@@ -58,6 +63,13 @@ class CameraRig:
         self._occlusion, self._dome = OcclusionMap(scenery), dome_triangles()
         self._drops = (rain_streaks() / 255).astype(np.float32)
         self._canvases: dict[tuple[int, int, int], Canvas] = {}
+
+    def repainted(self, paint: Repainting) -> CameraRig:
+        """Draws the same town, painted otherwise. It shares all else with this one, and closes with it."""
+        other = copy.copy(self)
+        other._vertices = paint.surfaces(self._vertices)
+        other._atmosphere = self._atmosphere.with_paint(paint.lines(self.town.appearance.paint))
+        return other
 
     def render(self, state: SceneState, mounts: Sequence[CameraConfig]) -> list[Image]:
         """One picture (H, W, 3) for each mount on the ego. Raises ValueError for an unknown weather."""
@@ -92,7 +104,7 @@ class CameraRig:
 
     def _drawn(self, camera: PinholeCamera, state: SceneState) -> Drawn:
         """All that a camera may see."""
-        actors = seen_actors(camera.frustum(), _zoom(camera), state.vehicles, state.pedestrians)
+        actors = seen_actors(camera.frustum(), _zoom(camera), state.vehicles, state.pedestrians, state.shown)
         return Drawn(self._meshes, actors, self._faces(camera), self._vertices, self._dome)
 
     def _faces(self, camera: PinholeCamera) -> Faces:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import IntEnum
+from enum import Flag, IntEnum, auto
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,17 @@ class Limb(IntEnum):
     RIGHT_LEG = 2
     LEFT_ARM = 3
     RIGHT_ARM = 4
+
+
+class Shown(Flag):
+    """What is drawn of a person."""
+
+    LEGS = auto()
+    """Up to the hips."""
+    TORSO = auto()
+    """All above."""
+    SHADOW = auto()
+    WHOLE = LEGS | TORSO | SHADOW
 
 
 def _surface(part: BodyPart, limb: int = 0) -> Surface:
@@ -67,6 +78,13 @@ def far_person_mesh() -> Mesh:
     head = box((0, 0, 1.56), (0.2, 0.19, 0.22), _surface(BodyPart.SKIN))
     hair = box((-0.02, 0, 1.70), (0.22, 0.21, 0.12), _surface(BodyPart.HAIR))
     return merge((*legs, torso, head, hair))
+
+
+def half_of(mesh: Mesh, half: Shown) -> Mesh:
+    """The triangles of a person's mesh that are LEGS or TORSO."""
+    first = mesh.vertices[mesh.triangles[:, 0]]
+    legs = (first["slot"] == BodyPart.TROUSERS) | np.isin(first["spare"], (Limb.LEFT_LEG, Limb.RIGHT_LEG))
+    return Mesh(mesh.vertices, mesh.triangles[legs == (half is Shown.LEGS)])
 
 
 def _legs() -> list[Mesh]:

@@ -1,0 +1,91 @@
+"""What explains a driver, as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from caldrive.affordances import SPECS
+
+if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
+    from caldrive.explain.blame import Blame
+    from caldrive.explain.counterfactual_study import Study
+    from caldrive.explain.counterfactuals import Effect
+    from caldrive.explain.observations import Finding
+    from caldrive.explain.recorded import Figures
+
+
+def blame_table(blame: Blame, name: str, episodes: int) -> Group:
+    """A row for each affordance, and for what none of them is to blame for."""
+    failures = len(blame.failures)
+    table = Table("affordance", "rescued by its truth", "fail with it alone seen", box=SIMPLE_HEAD)
+    for spec in SPECS:
+        table.add_row(spec.title, str(len(blame.rescued[spec.name])), str(len(blame.spoilt[spec.name])))
+    table.add_row("all of them", str(len(blame.rescued["all"])), "")
+    table.add_row("controller and world", "", str(len(blame.rest)))
+    return Group(Text(f"{name}: {failures} of {episodes} episodes went wrong"), table)
+
+
+def attention_table(figures: Sequence[Figures], out: Path) -> Group:
+    """How true the attention is, a row for each situation."""
+    said = Text(f"attention: {out}")
+    if not figures:
+        return Group(said)
+    heads = ("situation", "frames", "points at it", "on it", "its area", "deletion", "insertion", "new weights")
+    table = Table(*heads, box=SIMPLE_HEAD)
+    for one in figures:
+        where = ["" if value is None else f"{100 * value:.1f} %" for value in (one.pointing, one.energy, one.area)]
+        curves = (one.network, one.random, one.centred)
+        lost = " ".join(f"{curve.deletion:.2f}" for curve in curves)
+        won = " ".join(f"{curve.insertion:.2f}" for curve in curves)
+        cascade = " ".join(f"{value:.2f}" for value in one.cascade)
+        table.add_row(one.situation, str(one.examples), *where, lost, won, cascade)
+    note = "deletion, insertion: of the attention, of random maps, of the middle; new weights: rank correlation with it"
+    return Group(table, Text(note), said)
+
+
+def study_table(study: Study, out: Path) -> Group:
+    """The effect of each change, the verdict on each of the paper's observations, and where the sheet is."""
+    missed = [f"{name}: {found - right} of {found}" for name, (found, right) in study.found.items() if found > right]
+    gap = study.gap
+    notes = [
+        "probabilities of the class asked about, of a car ahead its distance in m; after: changed in all frames that "
+        "the network looks at, last column: in the present one alone; intervals: 95 %, episodes drawn again",
+        f"left out, as the network saw them wrong: {', '.join(missed) or 'none'}",
+        f"at the wheel, in 8-bit integers, {gap.other_answers} of {gap.cases} answers are other ones; probabilities "
+        f"differ by {gap.difference:.3f} on average",
+        f"sheet: {out}",
+    ]
+    return Group(_effect_table(study.effects), _finding_table(study.findings), *map(Text, notes))
+
+
+def _effect_table(effects: Sequence[Effect]) -> Table:
+    """A row for each change; controls, which should change nothing, are dim."""
+    heads = ("situation", "change", "cases", "before", "after", "difference", "flipped", "now alone")
+    table = Table(*heads, box=SIMPLE_HEAD)
+    for one in effects:
+        change = f"{one.change} (control)" if one.control else one.change
+        low, high = one.interval
+        table.add_row(
+            one.situation, change, str(one.cases), f"{one.before:.2f}", f"{one.after:.2f}",
+            f"{one.difference:+.2f} ({low:+.2f} to {high:+.2f})", f"{one.flipped}/{one.cases}",
+            f"{one.difference_now:+.2f} {one.flipped_now}/{one.cases}", style="dim" if one.control else "",
+        )  # fmt: skip
+    return table
+
+
+def _finding_table(findings: Sequence[Finding]) -> Table:
+    table = Table("the paper's observations", "cases", "value", "verdict", box=SIMPLE_HEAD)
+    for one in findings:
+        value = "-"
+        if one.value is not None and one.interval is not None:
+            low, high = one.interval
+            value = f"{one.value:+.3f} ({low:+.3f} to {high:+.3f})"
+        table.add_row(one.statement, str(one.cases), value, one.verdict)
+    return table
