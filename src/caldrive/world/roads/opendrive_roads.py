@@ -1,25 +1,27 @@
-"""A network as the roads of OpenDRIVE: its streets, and a connecting road for each way through a junction (ASAM
-OpenDRIVE 1.8, sections 10 to 12).
+"""A network as the roads of OpenDRIVE: its streets, and a connecting road for each turn at a junction (ASAM OpenDRIVE
+1.8, sections 10 to 12).
 
-A road's reference line is the middle of the leftmost lane that follows it, so that connecting roads are the very lines
-on which cars turn; a lane offset puts the lanes where they belong. Lanes count from the middle of the street outwards:
--1, -2 along the reference line, 1, 2 against it. A sidewalk is the outermost lane, where there is one.
+The reference line of a street is its middle, or the left border of a one-way street. That of a connecting road is the
+very line on which cars turn; a lane offset puts the lane around it. Lanes count outwards from the middle: -1, -2 along
+the reference line, 1, 2 against it. A sidewalk is the outermost lane, where there is one.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import shapely
 
 from caldrive.datatypes import Pose
-from caldrive.geometry import Polyline, moved
+from caldrive.geometry import Polyline, mitres, moved, to_local
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.roads.rounded_line import Piece, pieces_of, thinned
 from caldrive.world.roads.two_way_streets import Edge, Street, Turn, find_streets
 
+STEPS = 10  # after which a place beside a line is found; each leaves a third of the error, or less
 GRAIN = 1.0  # m along a kerb from one look for a sidewalk to the next
 
 
@@ -34,7 +36,7 @@ class Side:
 
     @property
     def widths(self) -> tuple[float, ...]:
-        """Of its lanes for cars from the middle outwards, m."""
+        """Of its lanes for cars, from the middle outwards, m."""
         return tuple(lane.width for lane in self.edges[0]) if self.edges else ()
 
 
@@ -67,7 +69,7 @@ class OpenDriveRoad:
     @property
     def offset(self) -> float:
         """m from the reference line to the left, where lanes count from."""
-        return self.right.widths[0] / 2
+        return 0.0 if self.junction is None else self.right.widths[0] / 2
 
     @property
     def sidewalks(self) -> tuple[int, int]:
@@ -75,9 +77,23 @@ class OpenDriveRoad:
         right, left = (len(side.widths) + 1 if side.sidewalk else 0 for side in (self.right, self.left))
         return -right, left
 
+    @cached_property
     def pieces(self) -> list[Piece]:
         """The reference line, smooth."""
         return pieces_of(self.line, *self.headings)
+
+    @cached_property
+    def length(self) -> float:
+        """Of the smooth line, m."""
+        return sum(piece.length for piece in self.pieces)
+
+    def locate(self, x: float, y: float) -> tuple[float, float]:
+        """A place as m along the smooth line, and to its left."""
+        s, left = self.line.project(x, y).s, 0.0
+        for _ in range(STEPS):  # the nearest place on a line with corners need not be the one right beside
+            ahead, left = to_local(self.line.pose_at(s), np.array((x, y))).tolist()
+            s = min(max(s + ahead, 0.0), self.line.length)
+        return s / self.line.length * self.length, left
 
     def middle(self, lane: int) -> float:
         """m from the reference line to the left, where a lane's middle is."""
@@ -102,6 +118,11 @@ class OpenDriveNetwork:
     """Their numbers by SUMO's names of them."""
     places: dict[str, tuple[int, int]] = field(repr=False)
     """Of each lane outside junctions the number of its street, and its own there."""
+
+    @property
+    def next_id(self) -> int:
+        """The first number after all of these."""
+        return len(self.streets) + len(self.junctions) + len(self.connecting)
 
 
 def opendrive_roads(roads: RoadNetwork) -> OpenDriveNetwork:
@@ -139,7 +160,8 @@ def _junction_of(turn: Turn) -> str:
 
 
 def _street(roads: RoadNetwork, id: int, street: Street) -> OpenDriveRoad:
-    line = Polyline(thinned(np.concatenate([edge[0].line.points for edge in street.ahead])))
+    points = thinned(np.concatenate([edge[0].line.points for edge in street.ahead]))
+    line = Polyline(points + street.ahead[0][0].width / 2 * mitres(points))
     return _with_sidewalks(roads, OpenDriveRoad(id, line, Side(street.ahead), Side(street.back)))
 
 

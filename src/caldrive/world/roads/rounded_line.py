@@ -16,7 +16,7 @@ from caldrive.datatypes import Points, Pose
 from caldrive.geometry import BLEND, Polyline, moved, to_local, wrap_angle
 
 LEAST_STEP = 0.25  # m; points nearer to the one before say more about rounding to centimetres than about the road
-MOST_OFF = 0.04  # m
+MOST_OFF = 0.03  # m
 STRAIGHT = 1e-4  # rad
 _NODES, _WEIGHTS = (values / 2 for values in np.polynomial.legendre.leggauss(8))
 
