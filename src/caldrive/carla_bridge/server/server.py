@@ -1,0 +1,259 @@
+"""The server: one thread that owns the world, answers calls in their order, and ticks between them.
+
+A step belongs to whoever calls `tick_cue` in synchronous mode, and to the clock otherwise. While no client is there the
+world stands at its beginning, so that a program that comes alone finds the same world each time.
+"""
+
+from __future__ import annotations
+
+import selectors
+import socket
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from caldrive.carla_bridge.server import snapshot
+from caldrive.carla_bridge.server.actors import Actor
+from caldrive.carla_bridge.server.calls import Call, serve
+from caldrive.carla_bridge.server.episode import Episode
+from caldrive.carla_bridge.server.layouts import Settings
+from caldrive.carla_bridge.server.maps import Maps, signal_ids
+from caldrive.carla_bridge.server.outbox import Gone, Outbox, accepted, listening
+from caldrive.carla_bridge.server.sensors import Senses, SensorActor
+from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.carla_bridge.server.streams import WORLD, Streams
+from caldrive.carla_bridge.server.wire import BrokenMessage, Request, Requests, answer, refused
+from caldrive.world.town import Town, load_town
+
+FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
+GRACE = 0.5  # s after the first client has come until the clock moves the world: time to ask for synchronous mode
+LONGEST_STEP = 1.0  # s
+RECEIVED = 2**18  # bytes that are read at once
+MOST_CLIENTS = 128
+MOST_UNREAD = 64_000_000  # bytes of answers that a client may leave unread
+
+
+@dataclass(eq=False)
+class Client:
+    """A connection that makes calls."""
+
+    number: int
+    socket: socket.socket
+    outbox: Outbox
+    requests: Requests = field(default_factory=Requests)
+
+
+class Server:
+    """One world, and all clients of it. Raises OSError where a port is taken, ValueError for a town that cannot be."""
+
+    def __init__(self, settings: ServerSettings) -> None:
+        self.settings, self.maps = settings, Maps(settings.maps)
+        self.rules, self.rules_owner = Settings(), 0
+        self.frame, self._episodes = 0, 0
+        self.managers: dict[int, tuple[str, int]] = {}
+        """Traffic managers that clients run: port to host and owner."""
+        self.calls: dict[str, Call] = {}
+        self._clients: dict[int, Client] = {}
+        self._next_client, self._next_step = 1, 0.0
+        self._senses: Senses | None = None
+        self._latest: Sequence[Any] | None = None
+        self._waiting = listening(settings.host, settings.port)
+        try:
+            self.port = int(self._waiting.getsockname()[1])
+            self.streams = Streams(listening(settings.host, self.port + 1), self.log, self._newcomer)
+        except BaseException:
+            self._waiting.close()
+            raise
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._waiting, selectors.EVENT_READ, self._let_in)
+        self._selector.register(self.streams, selectors.EVENT_READ, self.streams.poll)
+        self.episode = self._begin(settings.town)
+
+    def log(self, sentence: str) -> None:
+        """Says something on stderr, if anybody can hear it."""
+        with suppress(OSError, ValueError):
+            print(f"caldrive: {sentence}", file=sys.stderr, flush=True)
+
+    def _begin(self, town_name: str) -> Episode:
+        """A new episode in a town."""
+        town = load_town(town_name)
+        self._episodes += 1
+        episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads))
+        if self._senses is None or self._town is not town:
+            if self._senses is not None:
+                self._senses.close()
+            self._town: Town = town
+            self._senses = Senses(town)
+        return episode
+
+    def begin(self, town: str | None = None) -> None:
+        """Ends the episode and begins another, in the same town or another."""
+        for actor in self.sensors():
+            self.streams.close_stream(actor.stream)
+        town = town or self.episode.town.name
+        self.episode.close()
+        self.episode = self._begin(town)
+        self._note()
+
+    def warm_up(self) -> None:
+        """Does once what clients would have to wait for the first time; then all is as it was."""
+        assert self._senses is not None
+        self.episode.step(FREE_STEP)
+        self._senses.warm_up(self.episode)
+        self.begin()
+
+    def run(self) -> None:
+        """Serves until it is interrupted."""
+        while True:
+            self.turn()
+
+    def turn(self, patience: float = 1.0) -> None:
+        """Waits until something happens, at most some seconds, and does it."""
+        for key, events in self._selector.select(self._patience(patience)):
+            if isinstance(key.data, Client):
+                self._attend(key.data, events)
+            else:
+                key.data()
+        now = time.monotonic()
+        if self._clients and not self.rules.synchronous and now >= self._next_step:
+            delta = self.rules.delta or FREE_STEP
+            self._next_step = max(self._next_step + delta, now)
+            self.tick()
+
+    def _patience(self, most: float) -> float:
+        """s until the clock moves the world."""
+        if not self._clients or self.rules.synchronous:
+            return most
+        return min(most, max(0.0, self._next_step - time.monotonic()))
+
+    def _let_in(self) -> None:
+        while (connection := accepted(self._waiting)) is not None:
+            if len(self._clients) >= MOST_CLIENTS:
+                self.log(f"a client was turned away, as there are {MOST_CLIENTS}")
+                connection.close()
+                continue
+            if not self._clients:
+                self._next_step = time.monotonic() + GRACE
+            client = Client(self._next_client, connection, Outbox(connection))
+            self._next_client += 1
+            self._clients[client.number] = client
+            self._selector.register(connection, selectors.EVENT_READ, client)
+
+    def _attend(self, client: Client, events: int) -> None:
+        """Reads what a client asks for, and sends what it has to get."""
+        try:
+            if events & selectors.EVENT_WRITE:
+                client.outbox.flush()
+            if events & selectors.EVENT_READ:
+                self._hear(client)
+            if client.outbox.waiting > MOST_UNREAD:
+                raise BrokenMessage("it does not read its answers")
+            writes = selectors.EVENT_WRITE if client.outbox.waiting else 0
+            self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
+        except Gone:
+            self._let_go(client)
+        except BrokenMessage as error:
+            self.log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
+            self._let_go(client)
+
+    def _hear(self, client: Client) -> None:
+        try:
+            received = client.socket.recv(RECEIVED)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            raise Gone from error
+        if not received:
+            raise Gone
+        for request in client.requests.feed(received):
+            client.outbox.put([answer(request.id, self._result(client, request))])
+
+    def _result(self, client: Client, request: Request) -> Any:
+        """What a call gives. A fault of the program costs one call, not all clients."""
+        try:
+            return serve(self.calls, client.number, request)
+        except (Gone, BrokenMessage, KeyboardInterrupt):
+            raise
+        except Exception as error:  # the last door before everybody's world
+            self.log(f"found a fault of the program in {request.method} ({type(error).__name__}: {error}), wanted none")
+            found = self.calls[request.method]
+            return refused(f"found a fault of caldrive in {request.method}, wanted none: see its output", found.is_void)
+
+    def _let_go(self, client: Client) -> None:
+        """A client has gone, and what was its own goes with it."""
+        self._selector.unregister(client.socket)
+        client.socket.close()
+        del self._clients[client.number]
+        self.managers = {port: row for port, row in self.managers.items() if row[1] != client.number}
+        if self.settings.keep:
+            return
+        if self.rules_owner == client.number:
+            self.rules, self.rules_owner, self._next_step = Settings(), 0, time.monotonic()
+        if not self._clients:
+            self.rules, self.frame = Settings(), 0
+            self.begin(self.settings.town)
+            self._latest = None
+            return
+        for actor in self.episode.all(Actor):
+            if actor.owner == client.number and self.episode.get(actor.id) is actor:
+                self.destroy(actor)
+
+    def set_rules(self, rules: Settings, owner: int) -> None:
+        """Other settings from now on, of a client that they go with."""
+        self.rules, self.rules_owner, self._next_step = rules, owner, time.monotonic()
+
+    def sensors(self) -> list[SensorActor]:
+        """Those that clients have spawned."""
+        return self.episode.all(SensorActor)
+
+    def destroy(self, actor: Actor) -> None:
+        """An actor goes, with what is attached to it."""
+        for gone in self.episode.remove(actor):
+            if gone.stream:
+                self.streams.close_stream(gone.stream)
+
+    def tick(self) -> int:
+        """Moves the world on by a step and tells everybody; returns its frame."""
+        self.streams.settle()
+        self.frame += 1
+        self.episode.step(min(self.rules.delta or FREE_STEP, LONGEST_STEP))
+        self._note()
+        assert self._senses is not None
+        for sensor in self.sensors():
+            if sensor.stream and self.streams.is_wanted(sensor.stream):
+                if self.rules.no_rendering and ".camera." in sensor.kind:
+                    continue
+                for message in self._senses.messages(sensor, self.episode, self.frame):
+                    self.streams.send(sensor.stream, message)
+        return self.frame
+
+    def _note(self) -> None:
+        """Tells everybody who is where."""
+        episode = self.episode
+        head = snapshot.world_head(episode.number, episode.time, episode.delta, episode.is_new)
+        episode.is_new = False
+        place = snapshot.header(snapshot.Sensor.WORLD, self.frame, episode.time)
+        self._latest = [b"".join((place, head, *episode.rows()))]
+        self.streams.send(WORLD, self._latest)
+
+    def _newcomer(self, stream: int) -> Sequence[Any] | None:
+        """What a new subscriber gets at once: the latest snapshot."""
+        if stream != WORLD:
+            return None
+        if self._latest is None:
+            self._note()
+        return self._latest
+
+    def close(self) -> None:
+        """Ends it all."""
+        for client in self._clients.values():
+            client.socket.close()
+        self._selector.close()
+        self.streams.close()
+        self._waiting.close()
+        self.episode.close()
+        if self._senses is not None:
+            self._senses.close()
