@@ -95,6 +95,17 @@ def polygon_distance(first: Points, second: Points) -> float:
     return float(min(from_first.min(), from_second.min()))
 
 
+def mitres(points: Points) -> Points:
+    """Left normals (N, 2) of a line at its points (N, 2), lengthened at corners so that offset lines stay parallel."""
+    steps = np.diff(points, axis=0)
+    steps /= np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
+    left = np.stack((-steps[:, 1], steps[:, 0]), axis=1)
+    before, after = np.vstack((left[:1], left)), np.vstack((left, left[-1:]))
+    if np.allclose(points[0], points[-1]):
+        before[0], after[-1] = left[-1], left[0]
+    return np.asarray((before + after) / np.maximum(1 + (before * after).sum(1), 0.3)[:, None])
+
+
 @dataclass(frozen=True)
 class Projection:
     """Where a point meets a polyline: s along it (m), left of it (m, + left), and the tangent's heading there."""

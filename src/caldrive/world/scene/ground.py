@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points
-from caldrive.geometry import Polyline
+from caldrive.geometry import Polyline, mitres
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork, lane_area, rings
 from caldrive.world.scene.appearance import GroundCover
 from caldrive.world.scene.meshes import VERTEX, Mesh, Surface, merge, mesh_of_quads, packed, quads
@@ -32,17 +32,6 @@ LONGEST = 24.0  # m of one piece of ground, so that what lies out of sight is le
 UNITS_PER_METRE = 50  # of the half width in a vertex's colour
 JUNCTION_HALF_WIDTH = 5.0  # m, which tells the shader that no lane runs here
 UP = packed((0, 0, 1))
-
-
-def _normals(points: Points) -> Points:
-    """Left normals of a line at its points, lengthened at corners so that offset lines stay parallel."""
-    steps = np.diff(points, axis=0)
-    steps /= np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
-    left = np.stack((-steps[:, 1], steps[:, 0]), axis=1)
-    before, after = np.vstack((left[:1], left)), np.vstack((left, left[-1:]))
-    if np.allclose(points[0], points[-1]):
-        before[0], after[-1] = left[-1], left[0]
-    return np.asarray((before + after) / np.maximum(1 + (before * after).sum(1), 0.3)[:, None])
 
 
 def _resampled(line: Polyline, cuts: tuple[float, ...] = ()) -> tuple[NDArray[np.float64], Points]:
@@ -61,7 +50,7 @@ def _strip(chain: LaneChain, dash: float) -> Mesh:
     s, points = _resampled(chain.line, (zone, length - zone))
     under_kerb = 0.1 * np.array([chain.left == Border.EDGE, chain.right == Border.EDGE])
     across = np.array([1, -1]) * (chain.width / 2 + under_kerb)
-    xy = points[:, None] + across[:, None] * _normals(points)[:, None]
+    xy = points[:, None] + across[:, None] * mitres(points)[:, None]
     left_s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(xy[:, 0], axis=0), axis=1))))
     phase = left_s / left_s[-1] * max(1, round(left_s[-1] / dash))
     to_stop = length - s if chain.stop else np.full(len(s), FAR_AWAY)
@@ -103,7 +92,7 @@ def _bands(ring: shapely.LinearRing, lines: Sequence[tuple[float, float]], surfa
     """Strips along an edge of the roadway, which lies to the ring's left: one of each surface between lines, which are
     (m from the edge, height in m)."""
     s, points = _resampled(Polyline(shapely.get_coordinates(ring)))
-    away = -_normals(points)
+    away = -mitres(points)
     rows = [np.column_stack((points + d * away, np.full(len(points), z))) for d, z in lines]
     parts = []
     for (low, high), ((near, _), (far, _)), surface in zip(pairwise(rows), pairwise(lines), surfaces, strict=True):
