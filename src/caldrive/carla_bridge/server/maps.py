@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
+from functools import lru_cache
 from pathlib import Path
 
 from caldrive.carla_bridge.axes import Placement, standing
 from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.scenarios import TOWNS
 from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.opendrive_roads import opendrive_roads
+from caldrive.world.roads.opendrive_writer import write_opendrive
+from caldrive.world.roads.written_signals import signals_of
 from caldrive.world.traffic.start_places import start_places
 
 SPAWN_HEIGHT = 0.3  # m above the ground, as in CARLA
 PREFIX = "Carla/Maps/"
-CROSSING = 8.0  # m of a street at least that a spawn point is on
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,13 @@ class Maps:
     """Maps by their names: the embedded towns, and a folder of OpenDRIVE files such as CARLA's."""
 
     folder: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Raises OSError where there is no such folder."""
+        if self.folder is not None and not self.folder.is_dir():
+            raise FileNotFoundError(
+                f"found no folder {self.folder}, wanted one with OpenDRIVE files: give another --maps"
+            )
 
     def names(self) -> list[str]:
         """All that can be loaded by name."""
@@ -42,16 +51,15 @@ class Maps:
         )
 
 
+@lru_cache(maxsize=2)
 def opendrive(town: str, roads: RoadNetwork) -> str:
-    """The OpenDRIVE of a town. Raises Refusal where there is none."""
+    """The OpenDRIVE of a town: its own file, or one that is written. Raises Refusal where none can be."""
     if town.endswith(".xodr"):
         return Path(town).read_text()
-    if find_spec("caldrive.world.roads.opendrive_writer") is not None:
-        from importlib import import_module
-
-        written: str = import_module("caldrive.world.roads.opendrive_writer").opendrive(roads)
-        return written
-    raise Refusal(f"found no OpenDRIVE of {town}, wanted a map file: start the server with --town FILE.xodr")
+    try:
+        return write_opendrive(roads).decode()
+    except ValueError as error:
+        raise Refusal(str(error)) from error
 
 
 def map_name(roads: RoadNetwork) -> str:
@@ -65,5 +73,9 @@ def spawn_points(roads: RoadNetwork) -> list[Placement]:
 
 
 def signal_ids(town: str, roads: RoadNetwork) -> dict[str, str]:
-    """The ids that a town's lights have on its map, by those of their posts."""
-    return {}
+    """The ids that a town's lights have on the map that is written of it, by those of their posts; of a map file they
+    are not known."""
+    if town.endswith(".xodr"):
+        return {}
+    signals = signals_of(roads, opendrive_roads(roads))
+    return {post.id: str(signal.id) for signal in signals for post in signal.posts}

@@ -78,7 +78,7 @@ class Server:
             print(f"caldrive: {sentence}", file=sys.stderr, flush=True)
 
     def _begin(self, town_name: str) -> Episode:
-        """A new episode in a town."""
+        """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
         town = load_town(town_name)
         self._episodes += 1
         episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads))
@@ -90,13 +90,20 @@ class Server:
         return episode
 
     def begin(self, town: str | None = None) -> None:
-        """Ends the episode and begins another, in the same town or another."""
+        """Ends the episode and begins another, in the same town or another. Raises ValueError, OSError or RuntimeError
+        where there cannot be one; then the old town begins again."""
+        old = self.episode.town.name
+        load_town(town or old)  # a map that cannot be read costs nothing
         for actor in self.sensors():
             self.streams.close_stream(actor.stream)
-        town = town or self.episode.town.name
         self.episode.close()
-        self.episode = self._begin(town)
-        self._note()
+        try:
+            self.episode = self._begin(town or old)
+        except (ValueError, OSError, RuntimeError):
+            self.episode = self._begin(old)
+            raise
+        finally:
+            self._note()
 
     def warm_up(self) -> None:
         """Does once what clients would have to wait for the first time; then all is as it was."""
@@ -192,10 +199,9 @@ class Server:
             return
         if self.rules_owner == client.number:
             self.rules, self.rules_owner, self._next_step = Settings(), 0, time.monotonic()
-        if not self._clients:
-            self.rules, self.frame = Settings(), 0
+        if not self._clients:  # who comes next finds what the first one found
+            self.rules, self.frame, self._episodes = Settings(), 0, 0
             self.begin(self.settings.town)
-            self._latest = None
             return
         for actor in self.episode.all(Actor):
             if actor.owner == client.number and self.episode.get(actor.id) is actor:

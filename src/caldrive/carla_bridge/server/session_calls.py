@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import zlib
 from typing import Any
 
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.layouts import Settings, Weather, transform
 from caldrive.carla_bridge.server.maps import PREFIX, map_name, opendrive, spawn_points
+from caldrive.carla_bridge.server.navigation import navigation_mesh
 from caldrive.carla_bridge.server.server import LONGEST_STEP, Server
 from caldrive.carla_bridge.server.streams import WORLD
 from caldrive.carla_bridge.server.wire import Refusal
@@ -77,13 +79,22 @@ class SessionCalls:
 
     @call("get_required_files")
     def required_files(self, caller: int, folder: str = "") -> list[str]:
-        """Files that a client should keep: none."""
-        return []
+        """Files that a client should keep: where its crowd may walk."""
+        return [self._navigation[0]] if folder == "Nav" and self._navigation else []
 
     @call("request_file")
     def file(self, caller: int, name: str) -> bytes:
         """One of these."""
-        raise Refusal(f"found no file {name[:200]!r}, wanted one that get_required_files names")
+        if self._navigation is None or name != self._navigation[0]:
+            raise Refusal(f"found no file {name[:200]!r}, wanted one that get_required_files names")
+        return self._navigation[1]
+
+    @property
+    def _navigation(self) -> tuple[str, bytes] | None:
+        """The name and the content of the file for crowds; clients keep it, so its name says what is in it."""
+        roads = self._server.episode.town.roads
+        content = navigation_mesh(roads)
+        return (f"{PREFIX}Nav/{roads.name}-{zlib.crc32(content):08x}.bin", content) if content else None
 
     @call("get_available_maps")
     def maps(self, caller: int) -> list[str]:
@@ -143,8 +154,8 @@ class SessionCalls:
 
     @call("get_navigation_mesh")
     def navigation_mesh(self, caller: int) -> bytes:
-        """None; clients look for a file."""
-        return b""
+        """The same without a file."""
+        return self._navigation[1] if self._navigation else b""
 
     @call("is_traffic_manager_running")
     def has_manager(self, caller: int, port: int) -> bool:

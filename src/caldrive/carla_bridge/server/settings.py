@@ -39,5 +39,3 @@ class ServerSettings:
     def __post_init__(self) -> None:
         """Raises ValueError for what cannot be, before a town is loaded."""
         require_limits(asdict(self), LIMITS, {"port": 2000, "weather": 1, "cars": 20, "people": 50, "seed": 0})
-        if self.maps is not None and not self.maps.is_dir():
-            raise ValueError(f"found no folder {self.maps}, wanted one with OpenDRIVE files: give another --maps")

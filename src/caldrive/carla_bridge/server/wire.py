@@ -13,7 +13,7 @@ import msgpack
 from msgspec.msgpack import Encoder
 
 MOST_BYTES = 16_000_000  # of one message; a map that a client sends has a few
-_ENCODER = Encoder()
+_ENCODER = Encoder(enc_hook=float)  # for numbers of numpy
 
 
 class Refusal(Exception):  # noqa: N818 (it is no error of the program)
