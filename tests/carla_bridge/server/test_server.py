@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 from collections.abc import Iterator
 
@@ -35,10 +36,17 @@ def client(server: Server) -> Iterator[WireClient]:
 
 
 def place(client: WireClient, k: int) -> tuple[float, float, float]:
-    """The k-th spawn point: x, y, yaw."""
+    """The k-th of spawn points on a straight street, each before the next: x, y, yaw."""
     _, points = client.call("get_map_info")
-    (x, y, _), (_, yaw, _) = points[k]
-    return x, y, yaw
+    flat = [(x, y, yaw) for (x, y, _), (_, yaw, _) in points]
+    first = next(k for k in range(len(flat)) if is_straight(flat[k : k + 4]))
+    return flat[first + k]
+
+
+def is_straight(points: list[tuple[float, float, float]]) -> bool:
+    (x, y, yaw), *others = points
+    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    return all(abs((there[0] - x) * c + (there[1] - y) * s - 12.0 * k) < 0.5 for k, there in enumerate(others, 1))
 
 
 def control(throttle: float = 0.0, brake: float = 0.0) -> list[object]:
@@ -46,7 +54,7 @@ def control(throttle: float = 0.0, brake: float = 0.0) -> list[object]:
 
 
 def test_a_vehicle_under_throttle_moves_from_tick_to_tick(client: WireClient) -> None:
-    car, reader = client.spawn("vehicle.tesla.model3", place(client, 3)), Reader(client, WORLD)
+    car, reader = client.spawn("vehicle.tesla.model3", place(client, 0)), Reader(client, WORLD)
     reader.message()
     client.call("apply_control_to_vehicle", car, control(throttle=1.0))
     before = after = (0.0, 0.0)
@@ -58,14 +66,14 @@ def test_a_vehicle_under_throttle_moves_from_tick_to_tick(client: WireClient) ->
 
 
 def test_two_vehicles_do_not_stand_in_one_place(client: WireClient) -> None:
-    client.spawn("vehicle.tesla.model3", place(client, 3))
+    client.spawn("vehicle.tesla.model3", place(client, 0))
     with pytest.raises(RefusedError, match="Spawn failed because of collision at spawn position"):
-        client.spawn("vehicle.audi.tt", place(client, 3))
+        client.spawn("vehicle.audi.tt", place(client, 0))
 
 
 def test_what_a_client_spawned_goes_with_it_and_so_does_synchronous_mode(server: Server, client: WireClient) -> None:
     other = WireClient(server)
-    car = other.spawn("vehicle.tesla.model3", place(client, 3))
+    car = other.spawn("vehicle.tesla.model3", place(client, 0))
     other.synchronous(0.05)
     other.leave()
     assert client.call("get_actors_by_id", [car]) == []
@@ -75,8 +83,8 @@ def test_what_a_client_spawned_goes_with_it_and_so_does_synchronous_mode(server:
 def run_of_20_ticks(server: Server) -> list[bytes]:
     client = WireClient(server)
     client.synchronous()
-    client.spawn("vehicle.tesla.model3", place(client, 3))
-    client.spawn("walker.pedestrian.0002", place(client, 9))
+    client.spawn("vehicle.tesla.model3", place(client, 0))
+    client.spawn("walker.pedestrian.0002", place(client, 3))
     reader = Reader(client, WORLD)
     snapshots = [reader.message()]
     for _ in range(20):
@@ -128,7 +136,7 @@ def test_all_lights_can_be_frozen_on_green(server: Server, client: WireClient) -
 
 
 def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient) -> None:
-    x, y, yaw = place(client, 3)
+    x, y, yaw = place(client, 0)
     then = [[[2, [0, control(throttle=1.0)]]]]
     spawn = [[0, [[1, "vehicle.audi.tt", []], [[x, y, 0.3], [0.0, yaw, 0.0]], [False], 0, "", then]]]
     results = client.call("apply_batch", [spawn, spawn, [[1, [999_999]]], [[99, []]]], False)
@@ -150,7 +158,7 @@ def test_settings_that_cannot_be_are_refused(client: WireClient) -> None:
 def test_places_and_controls_that_are_no_numbers_do_no_harm(client: WireClient) -> None:
     with pytest.raises(RefusedError, match="finite"):
         client.spawn("vehicle.tesla.model3", (float("nan"), 0.0, 0.0))
-    car = client.spawn("vehicle.tesla.model3", place(client, 3))
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
     client.call("apply_control_to_vehicle", car, [float("nan"), 1e300, -1e300, False, False, False, 10**9])
     client.call("tick_cue")
     client.call("tick_cue")
@@ -162,10 +170,10 @@ def test_a_taken_port_is_told(server: Server) -> None:
 
 
 def test_a_vehicle_that_hits_a_standing_one_says_so(client: WireClient) -> None:
-    car = client.spawn("vehicle.tesla.model3", place(client, 3))
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
     sensor = client.call("spawn_actor_with_parent", [1, "sensor.other.collision", []],
                          [[0, 0, 0], [0, 0, 0]], car, 0, "")[0]  # fmt: skip
-    x, y, yaw = place(client, 4)
+    x, y, yaw = place(client, 1)
     client.spawn("vehicle.carlamotors.firetruck", (x, y, yaw))
     reader = Reader(client, sensor + 1)
     client.call("apply_control_to_vehicle", car, control(throttle=1.0))

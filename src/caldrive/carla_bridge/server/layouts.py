@@ -12,7 +12,7 @@ from msgspec import Struct
 from caldrive.carla_bridge.axes import Placement, from_carla, to_carla
 from caldrive.carla_bridge.server.wire import Refusal
 
-Optional = tuple[bool | float, ...]
+Maybe = tuple[bool | float, ...]
 """`(False,)` for nothing, `(True, value)` for a value."""
 
 
@@ -92,7 +92,7 @@ class Settings(Layout):
 
     synchronous: bool = False
     no_rendering: bool = False
-    fixed_delta: Optional = (False,)
+    fixed_delta: Maybe = (False,)
     substepping: bool = True
     max_substep_delta: float = 0.01
     max_substeps: int = 10

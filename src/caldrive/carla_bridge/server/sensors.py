@@ -28,7 +28,7 @@ EARTH = 6_378_137.0  # m, the radius by which CARLA's client turns places into l
 GRAVITY = 9.81  # m/s²
 FARTHEST = 1000.0  # m that a depth image reaches
 DEPTH_STEPS = 256**3 - 1
-MOST_AREA = 2**23  # pixels of an image
+MOST_AREA = 2**22  # pixels of an image
 CITY_LABELS = {
     Semantic.SKY: 11, Semantic.ROAD: 1, Semantic.LINE: 24, Semantic.SIDEWALK: 2, Semantic.GROUND: 10,
     Semantic.BUILDING: 3, Semantic.PLANT: 9, Semantic.FURNITURE: 20, Semantic.LIGHT: 7, Semantic.SIGN: 8,

@@ -29,7 +29,8 @@ from caldrive.carla_bridge.server.wire import BrokenMessage, Request, Requests, 
 from caldrive.world.town import Town, load_town
 
 FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
-GRACE = 0.5  # s after the first client has come until the clock moves the world: time to ask for synchronous mode
+GRACE = 0.5  # s after a call until the clock begins to move the world: time to ask for synchronous mode
+LONGEST_GRACE = 5.0  # s after the first client has come
 LONGEST_STEP = 1.0  # s
 RECEIVED = 2**18  # bytes that are read at once
 MOST_CLIENTS = 128
@@ -57,7 +58,7 @@ class Server:
         """Traffic managers that clients run: port to host and owner."""
         self.calls: dict[str, Call] = {}
         self._clients: dict[int, Client] = {}
-        self._next_client, self._next_step = 1, 0.0
+        self._next_client, self._next_step, self._begun = 1, 0.0, 0.0
         self._senses: Senses | None = None
         self._latest: Sequence[Any] | None = None
         self._waiting = listening(settings.host, settings.port)
@@ -126,9 +127,18 @@ class Server:
                 key.data()
         now = time.monotonic()
         if self._clients and not self.rules.synchronous and now >= self._next_step:
-            delta = self.rules.delta or FREE_STEP
-            self._next_step = max(self._next_step + delta, now)
+            self._next_step = max(self._next_step + (self.rules.delta or FREE_STEP), now)
+            self._tick_by_the_clock()
+
+    def _tick_by_the_clock(self) -> None:
+        """A step that no client asked for. A fault costs the episode, not the server."""
+        try:
             self.tick()
+        except Exception as error:  # nobody else could hear of it
+            self.log(
+                f"found a fault of the program ({type(error).__name__}: {error}), wanted none: the town begins again"
+            )
+            self.begin()
 
     def _patience(self, most: float) -> float:
         """s until the clock moves the world."""
@@ -143,7 +153,8 @@ class Server:
                 connection.close()
                 continue
             if not self._clients:
-                self._next_step = time.monotonic() + GRACE
+                self._begun = time.monotonic()
+                self._next_step = self._begun + GRACE
             client = Client(self._next_client, connection, Outbox(connection))
             self._next_client += 1
             self._clients[client.number] = client
@@ -175,6 +186,8 @@ class Server:
             raise Gone from error
         if not received:
             raise Gone
+        if self.frame == 0 and not self.rules.synchronous:
+            self._next_step = min(time.monotonic() + GRACE, self._begun + LONGEST_GRACE)
         for request in client.requests.feed(received):
             client.outbox.put([answer(request.id, self._result(client, request))])
 
@@ -227,14 +240,21 @@ class Server:
         self.frame += 1
         self.episode.step(min(self.rules.delta or FREE_STEP, LONGEST_STEP))
         self._note()
-        assert self._senses is not None
         for sensor in self.sensors():
-            if sensor.stream and self.streams.is_wanted(sensor.stream):
-                if self.rules.no_rendering and ".camera." in sensor.kind:
-                    continue
-                for message in self._senses.messages(sensor, self.episode, self.frame):
-                    self.streams.send(sensor.stream, message)
+            is_drawn = ".camera." in sensor.kind
+            if self.streams.is_wanted(sensor.stream) and not (is_drawn and self.rules.no_rendering):
+                self._hear_sensor(sensor)
         return self.frame
+
+    def _hear_sensor(self, sensor: SensorActor) -> None:
+        """Sends what a sensor says. A fault costs its stream."""
+        assert self._senses is not None
+        try:
+            for message in self._senses.messages(sensor, self.episode, self.frame):
+                self.streams.send(sensor.stream, message)
+        except Exception as error:  # a place or a lens that nobody thought of
+            self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: its stream ends")
+            self.streams.close_stream(sensor.stream)
 
     def _note(self) -> None:
         """Tells everybody who is where."""

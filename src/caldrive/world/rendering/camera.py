@@ -28,6 +28,7 @@ from caldrive.world.town import Town
 TOWN_FAR = 230.0  # m beyond which no more of the town is drawn
 TOWN_DETAIL = 32.0  # m within which details of the town are drawn, for a small picture
 VIEW_CELL = 8.0  # m; from the next one up, houses no longer hide what lies behind them
+MOST_CANVASES = 12  # sizes of pictures for which room is kept
 SMALL_FOCAL = 100.0  # px, the focal length of a small picture (200 x 88 at 90 degrees)
 
 
@@ -96,6 +97,8 @@ class CameraRig:
     def _canvas(self, size: tuple[int, int], samples: int) -> Canvas:
         key = *size, samples
         if key not in self._canvases:
+            if len(self._canvases) >= MOST_CANVASES:
+                del self._canvases[next(iter(self._canvases))]
             self._canvases[key] = Canvas(size, samples)
         return self._canvases[key]
 

@@ -31,6 +31,17 @@ def spawned(world: Any, id: str, at: Any, parent: Any = None, **attributes: str)
     return world.spawn_actor(blueprint, at, attach_to=parent) if parent else world.spawn_actor(blueprint, at)
 
 
+def straight(world: Any) -> list[Any]:
+    """Four spawn points on a straight street, each before the next."""
+    points = world.get_map().get_spawn_points()
+    for k in range(len(points) - 3):
+        here, ahead = points[k], points[k].get_forward_vector()
+        ways = [there.location - here.location for there in points[k : k + 4]]
+        if all(abs(way.x * ahead.x + way.y * ahead.y - 12.0 * i) < 0.5 for i, way in enumerate(ways)):
+            return list(points[k : k + 4])
+    raise AssertionError("no straight street")
+
+
 class Listener:
     """A sensor and what it says."""
 
