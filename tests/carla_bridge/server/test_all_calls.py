@@ -77,10 +77,11 @@ def server() -> Iterator[Server]:
 
 
 @pytest.fixture(scope="module")
-def client(server: Server) -> WireClient:
+def client(server: Server) -> Iterator[WireClient]:
     made = WireClient(server)
     made.synchronous()
-    return made
+    yield made
+    made.leave()
 
 
 @pytest.fixture(scope="module")

@@ -141,13 +141,13 @@ def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient)
     spawn = [[0, [[1, "vehicle.audi.tt", []], [[x, y, 0.3], [0.0, yaw, 0.0]], [False], 0, "", then]]]
     results = client.call("apply_batch", [spawn, spawn, [[1, [999_999]]], [[99, []]]], False)
     assert [result[0][0] for result in results] == [1, 0, 1, 0]
-    reader = Reader(client, WORLD)
-    start = positions(reader.message())
+    reader, car = Reader(client, WORLD), results[0][0][1]
+    assert car not in positions(reader.message())  # it has not been told yet
+    seen = []
     for _ in range(10):
         client.call("tick_cue")
-        end = positions(reader.message())
-    car = results[0][0][1]
-    assert start[car] != end[car]
+        seen.append(positions(reader.message())[car])
+    assert seen[0] != seen[-1]
 
 
 def test_settings_that_cannot_be_are_refused(client: WireClient) -> None:

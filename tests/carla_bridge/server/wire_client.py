@@ -27,6 +27,7 @@ class WireClient:
         self.socket = socket.create_connection(("127.0.0.1", server.port))
         self.socket.setblocking(False)
         self._unpacker, self._next = msgpack.Unpacker(raw=False), 0
+        self.readers: list[socket.socket] = []
 
     def call(self, method: str, *arguments: Any) -> Any:
         """The unwrapped result of a call. Raises RefusedError with the sentence of a refusal."""
@@ -39,10 +40,10 @@ class WireClient:
         match result:
             case [[False]]:
                 return None
+            case [[True, [text]]] | [[0, [text]]]:  # 1 is matched by True, but not True by 1
+                raise RefusedError(text)
             case [[1, value]]:
                 return value
-            case [[True, [text]]] | [[0, [text]]]:
-                raise RefusedError(text)
         raise AssertionError(f"{method} gave {result!r}")
 
     def _answer(self) -> Any:
@@ -74,7 +75,8 @@ class WireClient:
 
     def leave(self) -> None:
         """Goes without a word."""
-        self.socket.close()
+        for one in (self.socket, *self.readers):
+            one.close()
         self.server.turn(0.1)
 
 
@@ -87,6 +89,7 @@ class Reader:
         assert number == stream
         self.server, self._bytes = client.server, b""
         self.socket = socket.create_connection(("127.0.0.1", port))
+        client.readers.append(self.socket)
         self.socket.send(struct.pack("<I", stream))
         self.socket.setblocking(False)
 

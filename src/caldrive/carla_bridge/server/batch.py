@@ -18,7 +18,7 @@ MOST_COMMANDS = 10_000
 DEEPEST = 8  # commands that follow on commands
 
 
-class Spawn(Layout):
+class Spawn(Layout, frozen=True):
     """Command 0."""
 
     description: ActorDescription

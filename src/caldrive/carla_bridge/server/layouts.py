@@ -23,7 +23,7 @@ class Layout(Struct, array_like=True, frozen=True):
     """A value that travels as an array."""
 
 
-class Vector(Layout):
+class Vector(Layout, frozen=True):
     """A place or a direction."""
 
     x: float = 0.0
@@ -31,7 +31,7 @@ class Vector(Layout):
     z: float = 0.0
 
 
-class Rotation(Layout):
+class Rotation(Layout, frozen=True):
     """In this order."""
 
     pitch: float = 0.0
@@ -39,14 +39,14 @@ class Rotation(Layout):
     roll: float = 0.0
 
 
-class Transform(Layout):
+class Transform(Layout, frozen=True):
     """A place and how something is turned there."""
 
     location: Vector = Vector()
     rotation: Rotation = Rotation()
 
 
-class BoundingBox(Layout):
+class BoundingBox(Layout, frozen=True):
     """Relative to its actor."""
 
     location: Vector = Vector()
@@ -56,7 +56,7 @@ class BoundingBox(Layout):
     actor: int = 0
 
 
-class AttributeValue(Layout):
+class AttributeValue(Layout, frozen=True):
     """What a client chose."""
 
     id: str
@@ -64,7 +64,7 @@ class AttributeValue(Layout):
     value: str
 
 
-class ActorDescription(Layout):
+class ActorDescription(Layout, frozen=True):
     """What a client asks for."""
 
     uid: int
@@ -87,7 +87,7 @@ class ActorDescription(Layout):
         return value
 
 
-class Settings(Layout):
+class Settings(Layout, frozen=True):
     """EpisodeSettings."""
 
     synchronous: bool = False
@@ -108,7 +108,7 @@ class Settings(Layout):
         return float(self.fixed_delta[1]) if self.fixed_delta[0] and len(self.fixed_delta) > 1 else None
 
 
-class VehicleControl(Layout):
+class VehicleControl(Layout, frozen=True):
     """steer: + to the right."""
 
     throttle: float = 0.0
@@ -120,7 +120,7 @@ class VehicleControl(Layout):
     gear: int = 0
 
 
-class AckermannControl(Layout):
+class AckermannControl(Layout, frozen=True):
     """steer in rad, + to the right."""
 
     steer: float = 0.0
@@ -130,7 +130,7 @@ class AckermannControl(Layout):
     jerk: float = 0.0
 
 
-class AckermannSettings(Layout):
+class AckermannSettings(Layout, frozen=True):
     """Gains of the controller behind an AckermannControl."""
 
     speed_kp: float = 0.15
@@ -141,7 +141,7 @@ class AckermannSettings(Layout):
     accel_kd: float = 0.01
 
 
-class WalkerControl(Layout):
+class WalkerControl(Layout, frozen=True):
     """direction: in the world; speed in m/s."""
 
     direction: Vector = Vector(1.0)
@@ -149,7 +149,7 @@ class WalkerControl(Layout):
     jump: bool = False
 
 
-class Weather(Layout):
+class Weather(Layout, frozen=True):
     """CARLA's, in percent and degrees."""
 
     cloudiness: float = 5.0
@@ -168,7 +168,7 @@ class Weather(Layout):
     dust_storm: float = 0.0
 
 
-class Wheel(Layout):
+class Wheel(Layout, frozen=True):
     """Radius and position in cm, the position in the world."""
 
     tire_friction: float = 3.5
@@ -183,7 +183,7 @@ class Wheel(Layout):
     position: Vector = Vector()
 
 
-class PhysicsControl(Layout):
+class PhysicsControl(Layout, frozen=True):
     """VehiclePhysicsControl; mass in kg."""
 
     torque_curve: tuple[Row, ...] = ((0.0, 400.0), (5000.0, 400.0))

@@ -10,6 +10,7 @@ from caldrive.carla_bridge.axes import Placement, standing
 from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.scenarios import TOWNS
 from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.opendrive import read_map
 from caldrive.world.roads.opendrive_roads import opendrive_roads
 from caldrive.world.roads.opendrive_writer import write_opendrive
 from caldrive.world.roads.written_signals import signals_of
@@ -73,9 +74,12 @@ def spawn_points(roads: RoadNetwork) -> list[Placement]:
 
 
 def signal_ids(town: str, roads: RoadNetwork) -> dict[str, str]:
-    """The ids that a town's lights have on the map that is written of it, by those of their posts; of a map file they
-    are not known."""
+    """The ids that a town's lights have on its map, by those of their posts."""
     if town.endswith(".xodr"):
-        return {}
+        ids = read_map(Path(town).read_bytes()).signals.ids
+        # netconvert marks the lanes along the reference line of a road
+        edges = {f"-{road}" if forward else road: id for (road, forward), id in ids.items()}
+        found = {post.id: edges.get(roads.lanes[post.lane].edge.partition("#")[0]) for post in roads.posts}
+        return {post: id for post, id in found.items() if id}
     signals = signals_of(roads, opendrive_roads(roads))
     return {post.id: str(signal.id) for signal in signals for post in signal.posts}

@@ -66,7 +66,7 @@ class Streams:
 
     def fileno(self) -> int:
         """For whoever waits until something happens here."""
-        return self._selector.fileno()  # type: ignore[attr-defined, no-any-return]
+        return self._selector.fileno()
 
     def token(self, stream: int) -> bytes:
         """What a client needs to subscribe."""
