@@ -108,8 +108,10 @@ class Episode:
         """Moves everything on by delta seconds."""
         self.delta, self.time, self._steps = delta, self.time + delta, self._steps + 1
         vehicles, walkers = self.all(Vehicle), self.all(Walker)
-        for one in (*vehicles, *walkers):
-            one.step(delta)
+        for vehicle in vehicles:
+            vehicle.step(delta)
+        for walker in walkers:
+            walker.step(delta)
         self._population.move_to(self.time, [one.box_state() for one in vehicles], self._walker_states())
         self._take_down()
         self.hits = resolve_contacts(vehicles, self._bodies(), self.all(Prop), self.town.obstacles)
@@ -134,7 +136,7 @@ class Episode:
             actor = self._native(person, f"walker.pedestrian.{1 + k % 30:04}")
             actor.own_place = standing(person.pose, UP)
         there = [*self.cars, *(one.box_state() for one in self.all(Vehicle))]
-        ids = [actor.id for car in there if (actor := self.actor_of(car.id)) is not None]
+        ids = [found.id for car in there if (found := self.actor_of(car.id)) is not None]
         self._at_light = dict(zip(ids, self.lights.before([car.pose for car in there]), strict=True))
 
     def _native(self, body: VehicleState | PedestrianState, kind: str) -> Actor:
@@ -171,7 +173,7 @@ class Episode:
 
     def rows(self) -> list[bytes]:
         """All actors, as a snapshot has them."""
-        absent = self._natives.keys() - {one.id for one in (*self.cars, *self.people)}
+        absent = self._natives.keys() - {one.id for one in self.cars} - {one.id for one in self.people}
         missing = {self._natives[name].id for name in absent}
         return [
             snapshot.actor_row(one.id, one.place, one.motion, self._part(one))

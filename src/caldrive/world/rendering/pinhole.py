@@ -114,10 +114,13 @@ class PinholeCamera:
         )  # fmt: skip
 
     def frustum(self) -> Frustum:
-        """What the picture covers on the plane."""
+        """What the picture covers on the plane; where it may show what lies behind the eye, everything."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
         is_level = max(abs(self.pitch), abs(self.roll)) < LEVEL
         tangent = math.tan(math.radians(self.fov) / 2) if is_level else ALL_AROUND
+        to_corner = math.atan(math.hypot(*self.size) / 2 / self.focal)
+        if not is_level and abs(self.pitch) + to_corner > math.pi / 2:
+            c = s = 0.0  # nothing is ahead and nothing aside
         return Frustum((self.pose.x, self.pose.y, self.height), (c, s), (-s, c), tangent)
 
 
