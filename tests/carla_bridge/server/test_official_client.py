@@ -16,7 +16,7 @@ import pytest
 
 PORT, MANAGER = 24640, 24650
 ROOT = Path(__file__).parents[3]
-PATIENCE = 300.0  # s
+PATIENCE = 900.0  # s
 pytestmark = pytest.mark.skipif(find_spec("carla") is None, reason="needs the wheel of CARLA's client")
 
 

@@ -24,7 +24,7 @@ class WireClient:
 
     def __init__(self, server: Server) -> None:
         self.server = server
-        self.socket = socket.create_connection(("127.0.0.1", server.port))
+        self.socket = socket.create_connection(("127.0.0.1", server.clients.port))
         self.socket.setblocking(False)
         self._unpacker, self._next = msgpack.Unpacker(raw=False), 0
         self.readers: list[socket.socket] = []

@@ -6,45 +6,32 @@ world stands at its beginning, so that a program that comes alone finds the same
 
 from __future__ import annotations
 
+import math
 import selectors
-import socket
 import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 from caldrive.carla_bridge.server import snapshot
 from caldrive.carla_bridge.server.actors import Actor
 from caldrive.carla_bridge.server.calls import Call, serve
+from caldrive.carla_bridge.server.clients import Clients
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
-from caldrive.carla_bridge.server.outbox import Gone, Outbox, accepted, listening
+from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.sensors import Senses, SensorActor
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
-from caldrive.carla_bridge.server.wire import BrokenMessage, Request, Requests, answer, refused
+from caldrive.carla_bridge.server.wire import Request, refused
 from caldrive.world.town import Town, load_town
 
 FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
 GRACE = 0.5  # s after a call until the clock begins to move the world: time to ask for synchronous mode
-LONGEST_GRACE = 5.0  # s after the first client has come
+LONGEST_GRACE = 5.0  # s after the first call
 LONGEST_STEP = 1.0  # s
-RECEIVED = 2**18  # bytes that are read at once
-MOST_CLIENTS = 128
-MOST_UNREAD = 64_000_000  # bytes of answers that a client may leave unread
-
-
-@dataclass(eq=False)
-class Client:
-    """A connection that makes calls."""
-
-    number: int
-    socket: socket.socket
-    outbox: Outbox
-    requests: Requests = field(default_factory=Requests)
 
 
 class Server:
@@ -57,19 +44,17 @@ class Server:
         self.managers: dict[int, tuple[str, int]] = {}
         """Traffic managers that clients run: port to host and owner."""
         self.calls: dict[str, Call] = {}
-        self._clients: dict[int, Client] = {}
-        self._next_client, self._next_step, self._begun = 1, 0.0, 0.0
+        self._first_call, self._next_step = math.inf, math.inf  # s by the clock
         self._senses: Senses | None = None
         self._latest: Sequence[Any] | None = None
-        self._waiting = listening(settings.host, settings.port)
+        self.clients = Clients(listening(settings.host, settings.port), self.log, self._result, self._forget)
         try:
-            self.port = int(self._waiting.getsockname()[1])
-            self.streams = Streams(listening(settings.host, self.port + 1), self.log, self._newcomer)
+            self.streams = Streams(listening(settings.host, settings.port + 1), self.log, self._newcomer)
         except BaseException:
-            self._waiting.close()
+            self.clients.close()
             raise
         self._selector = selectors.DefaultSelector()
-        self._selector.register(self._waiting, selectors.EVENT_READ, self._let_in)
+        self._selector.register(self.clients, selectors.EVENT_READ, self.clients.poll)
         self._selector.register(self.streams, selectors.EVENT_READ, self.streams.poll)
         self.episode = self._begin(settings.town)
 
@@ -120,13 +105,10 @@ class Server:
 
     def turn(self, patience: float = 1.0) -> None:
         """Waits until something happens, at most some seconds, and does it."""
-        for key, events in self._selector.select(self._patience(patience)):
-            if isinstance(key.data, Client):
-                self._attend(key.data, events)
-            else:
-                key.data()
+        for key, _ in self._selector.select(self._patience(patience)):
+            key.data()
         now = time.monotonic()
-        if self._clients and not self.rules.synchronous and now >= self._next_step:
+        if self.clients and not self.rules.synchronous and now >= self._next_step:
             self._next_step = max(self._next_step + (self.rules.delta or FREE_STEP), now)
             self._tick_by_the_clock()
 
@@ -142,82 +124,37 @@ class Server:
 
     def _patience(self, most: float) -> float:
         """s until the clock moves the world."""
-        if not self._clients or self.rules.synchronous:
+        if not self.clients or self.rules.synchronous:
             return most
         return min(most, max(0.0, self._next_step - time.monotonic()))
 
-    def _let_in(self) -> None:
-        while (connection := accepted(self._waiting)) is not None:
-            if len(self._clients) >= MOST_CLIENTS:
-                self.log(f"a client was turned away, as there are {MOST_CLIENTS}")
-                connection.close()
-                continue
-            if not self._clients:
-                self._begun = time.monotonic()
-                self._next_step = self._begun + GRACE
-            client = Client(self._next_client, connection, Outbox(connection))
-            self._next_client += 1
-            self._clients[client.number] = client
-            self._selector.register(connection, selectors.EVENT_READ, client)
-
-    def _attend(self, client: Client, events: int) -> None:
-        """Reads what a client asks for, and sends what it has to get."""
-        try:
-            if events & selectors.EVENT_WRITE:
-                client.outbox.flush()
-            if events & selectors.EVENT_READ:
-                self._hear(client)
-            if client.outbox.waiting > MOST_UNREAD:
-                raise BrokenMessage("it does not read its answers")
-            writes = selectors.EVENT_WRITE if client.outbox.waiting else 0
-            self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
-        except Gone:
-            self._let_go(client)
-        except BrokenMessage as error:
-            self.log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
-            self._let_go(client)
-
-    def _hear(self, client: Client) -> None:
-        try:
-            received = client.socket.recv(RECEIVED)
-        except (BlockingIOError, InterruptedError):
-            return
-        except OSError as error:
-            raise Gone from error
-        if not received:
-            raise Gone
-        if self.frame == 0 and not self.rules.synchronous:
-            self._next_step = min(time.monotonic() + GRACE, self._begun + LONGEST_GRACE)
-        for request in client.requests.feed(received):
-            client.outbox.put([answer(request.id, self._result(client, request))])
-
-    def _result(self, client: Client, request: Request) -> Any:
+    def _result(self, caller: int, request: Request) -> Any:
         """What a call gives. A fault of the program costs one call, not all clients."""
+        if self.frame == 0 and not self.rules.synchronous:
+            now = time.monotonic()
+            self._first_call = min(self._first_call, now)
+            self._next_step = min(now + GRACE, self._first_call + LONGEST_GRACE)
         try:
-            return serve(self.calls, client.number, request)
-        except (Gone, BrokenMessage, KeyboardInterrupt):
-            raise
+            return serve(self.calls, caller, request)
         except Exception as error:  # the last door before everybody's world
             self.log(f"found a fault of the program in {request.method} ({type(error).__name__}: {error}), wanted none")
             found = self.calls[request.method]
             return refused(f"found a fault of caldrive in {request.method}, wanted none: see its output", found.is_void)
 
-    def _let_go(self, client: Client) -> None:
+    def _forget(self, client: int) -> None:
         """A client has gone, and what was its own goes with it."""
-        self._selector.unregister(client.socket)
-        client.socket.close()
-        del self._clients[client.number]
-        self.managers = {port: row for port, row in self.managers.items() if row[1] != client.number}
+        self.managers = {port: row for port, row in self.managers.items() if row[1] != client}
         if self.settings.keep:
             return
-        if self.rules_owner == client.number:
+        if self.rules_owner == client:
             self.rules, self.rules_owner, self._next_step = Settings(), 0, time.monotonic()
-        if not self._clients:  # who comes next finds what the first one found
+        if not self.clients:  # who comes next finds what the first one found
             self.rules, self.frame, self._episodes = Settings(), 0, 0
+            self._first_call = self._next_step = math.inf
             self.begin(self.settings.town)
             return
         for actor in self.episode.all(Actor):
-            if actor.owner == client.number and self.episode.get(actor.id) is actor:
+            if actor.owner == client and self.episode.get(actor.id) is actor:
                 self.destroy(actor)
 
     def set_rules(self, rules: Settings, owner: int) -> None:
@@ -275,11 +212,9 @@ class Server:
 
     def close(self) -> None:
         """Ends it all."""
-        for client in self._clients.values():
-            client.socket.close()
         self._selector.close()
+        self.clients.close()
         self.streams.close()
-        self._waiting.close()
         self.episode.close()
         if self._senses is not None:
             self._senses.close()

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from caldrive.carla_bridge.server.outbox import Gone, Outbox, accepted
+from caldrive.carla_bridge.server.outbox import Gone, Log, Outbox, accepted
 
 WORLD = 1  # the stream of snapshots
 TOKEN = struct.Struct("<IHBB16x")
@@ -22,7 +22,6 @@ TCP, SAME_HOST = 1, 0  # the protocol in a token; the address that a client has 
 MOST_WAITING = 32_000_000  # bytes that a subscriber may be behind
 PATIENCE = 1.0  # s that a subscriber may take for nothing, and that an announced one may take to come
 MOST_SUBSCRIBERS = 512
-Log = Callable[[str], None]
 
 
 class Subscriber:

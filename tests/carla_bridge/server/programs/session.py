@@ -8,7 +8,7 @@ from typing import Any
 
 import carla
 
-PATIENCE = 60.0  # s
+PATIENCE = 300.0  # s
 
 
 def connect() -> Any:
