@@ -21,6 +21,7 @@ from caldrive.commands.drive import Determinism, Drive
 from caldrive.commands.explain import Blame, ExplainCounterfactuals, ExplainDrive, ExplainPictures, ExplainRecording
 from caldrive.commands.search import Search
 from caldrive.commands.see import See
+from caldrive.commands.serve_carla import ServeCarla
 from caldrive.commands.speed import AgentSpeed, WorldSpeed
 from caldrive.commands.town import Town
 from caldrive.commands.train import Evaluate, Train
@@ -58,6 +59,7 @@ VERBS: Mapping[str, Verb] = {
     "search": Verb(Search, "Search for better task blocks of the network."),
     "tune": Verb(Tune, "Tune the controller: on a page with live signals, or by a search."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
+    "serve-carla": Verb(ServeCarla, "Let CARLA's client drive in the embedded world."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
     "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),
     "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),

@@ -18,6 +18,11 @@ def seen(*states: VehicleState | PedestrianState) -> Actors:
     return seen_actors(AHEAD, 1.0, cars, [state for state in states if isinstance(state, PedestrianState)])
 
 
+def test_a_camera_that_looks_down_sees_who_is_behind_its_middle() -> None:
+    down = PinholeCamera(Pose(0, 0, 0), height=40.0, pitch=-np.pi / 2, fov=90.0, size=(64, 64)).frustum()
+    assert len(seen_actors(down, 1.0, [VehicleState(Pose(-20, 0, 0))], ()).meshes) == 1
+
+
 def test_the_same_id_looks_the_same_and_people_differ() -> None:
     people = [PedestrianState(Pose(float(i), 0, 0), 1.0, id=f"p{i}") for i in range(40)]
     first, again = seen(*people), seen(*people[::-1])

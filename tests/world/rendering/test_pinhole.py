@@ -16,14 +16,20 @@ def test_points_land_where_the_pinhole_puts_them() -> None:
     assert (x * 100, y * 44) == pytest.approx((-20, -10))  # px from the middle, y down
 
 
-@pytest.mark.parametrize("pitch", [0.0, -0.3, -np.pi / 2])
-def test_what_a_pixel_shows_lands_on_it(pitch: float) -> None:
-    camera = PinholeCamera(Pose(3, -2, 0.7), height=1.2, pitch=pitch, fov=90.0, size=(200, 88))
+@pytest.mark.parametrize(("pitch", "roll"), [(0.0, 0.0), (-0.3, 0.0), (-np.pi / 2, 0.0), (0.2, 0.5)])
+def test_what_a_pixel_shows_lands_on_it(pitch: float, roll: float) -> None:
+    camera = PinholeCamera(Pose(3, -2, 0.7), height=1.2, pitch=pitch, fov=90.0, size=(200, 88), roll=roll)
     view, (column, row), away = camera.view(), (17, 60), 25.0
     point = view.position + away * (view.ahead + column * view.right + row * view.down)
     x, y, w = view.matrix @ np.append(point, 1.0)
     assert w == pytest.approx(away, rel=1e-4)
     assert ((x / w + 1) * 100 - 0.5, (y / w + 1) * 44 - 0.5) == pytest.approx((column, row), abs=1e-3)
+
+
+def test_a_camera_whose_right_side_is_down_sees_what_is_on_the_right_higher() -> None:
+    camera = PinholeCamera(Pose(0, 0, 0), height=1.2, pitch=0.0, fov=90.0, size=(200, 88), roll=0.3)
+    right, left = (camera.view().matrix @ np.array([10.0, y, 1.2, 1.0]) for y in (-3.0, 3.0))
+    assert right[1] < 0 < left[1]  # y down
 
 
 @pytest.mark.parametrize(

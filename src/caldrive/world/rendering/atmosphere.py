@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,10 @@ from caldrive.world.scene.scenery import Prop
 from caldrive.world.scene.shadows import Bounds, shadow_bounds, shadow_heights
 from caldrive.world.scene.sky import panorama
 from caldrive.world.scene.textures import texture_layers
-from caldrive.world.scene.weather import lighting, weather
+from caldrive.world.scene.weather import Weather, as_weather, lighting
 
 KEPT = 6  # shadows that are remembered, up to 64 MB each
+KEPT_SKIES = 32  # weathers whose light and sky are remembered, below 1 MB each
 
 
 class Atmosphere:
@@ -29,22 +31,29 @@ class Atmosphere:
 
     def __init__(self, roads: RoadNetwork, scenery: Sequence[Prop], appearance: Appearance) -> None:
         self.roads, self.scenery, self.appearance = roads, scenery, appearance
-        self._lights: dict[tuple[int, Bounds], Light] = {}
-        self._materials: dict[int, Materials] = {}
-        self._skies: dict[int, Texels] = {}
+        self._lights: dict[tuple[Weather, Bounds], Light] = {}
+        self._materials: dict[Weather, Materials] = {}
+        self._skies: dict[Weather, Texels] = {}
         self._shadows: dict[tuple[float, Bounds], Integers] = {}  # by the sun's altitude, and what they cover
 
-    def in_weather(self, id: int, x: float, y: float) -> tuple[Light, Materials]:
+    def in_weather(self, given: int | Weather, x: float, y: float) -> tuple[Light, Materials]:
         """Light and materials in a weather, around a place in m. Raises ValueError for an unknown weather."""
-        bounds = shadow_bounds(self.roads.bounds, x, y)
-        if (id, bounds) not in self._lights:
-            self._lights[id, bounds] = self._light(id, bounds)
-        if id not in self._materials:
-            self._materials[id] = self._made(id)
-        return self._lights[id, bounds], self._materials[id]
+        current, bounds = as_weather(given), shadow_bounds(self.roads.bounds, x, y)
+        if (current, bounds) not in self._lights:
+            self._make_room(self._lights)
+            self._lights[current, bounds] = self._light(current, bounds)
+        if current not in self._materials:
+            self._make_room(self._materials)
+            self._materials[current] = self._made(current)
+        return self._lights[current, bounds], self._materials[current]
 
-    def _light(self, id: int, bounds: Bounds) -> Light:
-        current = weather(id)
+    @staticmethod
+    def _make_room(kept: dict[Any, Any]) -> None:
+        """Forgets the oldest of what is remembered, where that is much."""
+        if len(kept) >= KEPT_SKIES:
+            del kept[next(iter(kept))]
+
+    def _light(self, current: Weather, bounds: Bounds) -> Light:
         light, key = lighting(current, self.appearance.sun_azimuth), (current.sun_altitude, bounds)
         if key not in self._shadows:
             if len(self._shadows) >= KEPT:
@@ -58,13 +67,14 @@ class Atmosphere:
         for other in [other for other in self._lights if other[1] == key[1]]:
             del self._lights[other]
 
-    def _made(self, id: int) -> Materials:
-        current, paint = weather(id), self.appearance.paint
-        if id not in self._skies:
+    def _made(self, current: Weather) -> Materials:
+        paint = self.appearance.paint
+        if current not in self._skies:
+            self._make_room(self._skies)
             light = lighting(current, self.appearance.sun_azimuth)
-            self._skies[id] = packed(panorama(current, light, zlib.crc32(self.roads.name.encode())))
+            self._skies[current] = packed(panorama(current, light, zlib.crc32(self.roads.name.encode())))
         colors = [(*color, 0.0) for color in (paint.center, paint.edge, paint.asphalt)]
-        return Materials(layers(), self._skies[id], np.array([*colors, paint.widths], np.float32))
+        return Materials(layers(), self._skies[current], np.array([*colors, paint.widths], np.float32))
 
     def with_paint(self, paint: RoadPaint) -> Atmosphere:
         """The same with other road markings; it shares lights and skies."""

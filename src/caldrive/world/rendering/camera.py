@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.compiled import f32
+from caldrive.compiled import Floats, f32
 from caldrive.datatypes import CameraConfig, Image, LightState, PedestrianState, VehicleState
 from caldrive.world.rendering.actor_meshes import actor_meshes
 from caldrive.world.rendering.actors import seen_actors
@@ -25,11 +25,13 @@ from caldrive.world.rendering.tiles import Faces, ViewCell
 from caldrive.world.rendering.town_mesh import town_grid, town_vertices
 from caldrive.world.scene.people import Shown
 from caldrive.world.scene.sky import dome_triangles, rain_streaks
+from caldrive.world.scene.weather import Weather
 from caldrive.world.town import Town
 
 TOWN_FAR = 230.0  # m beyond which no more of the town is drawn
 TOWN_DETAIL = 32.0  # m within which details of the town are drawn, for a small picture
 VIEW_CELL = 8.0  # m; from the next one up, houses no longer hide what lies behind them
+MOST_CANVASES = 12  # sizes of pictures for which room is kept
 SMALL_FOCAL = 100.0  # px, the focal length of a small picture (200 x 88 at 90 degrees)
 
 
@@ -37,8 +39,8 @@ SMALL_FOCAL = 100.0  # px, the focal length of a small picture (200 x 88 at 90 d
 class SceneState:
     """What a picture shows beside the town."""
 
-    weather: int
-    """1 to 14."""
+    weather: int | Weather
+    """1 to 14, or one of one's own."""
     ego: VehicleState
     """It is not drawn: cameras are mounted on it."""
     vehicles: Sequence[VehicleState] = ()
@@ -89,16 +91,26 @@ class CameraRig:
 
     def render_semantics(self, state: SceneState, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
         """What each pixel of `render`'s pictures shows, (H, W) for each mount, as numbers of `Semantic`."""
-        here = state.ego.pose
-        light, materials = self._atmosphere.in_weather(state.weather, here.x, here.y)
-        return [
-            self._canvas(camera.size, 1).classes(self._drawn(camera, state), Scene(materials, light, camera.view()))
-            for camera in (camera_on(state.ego, mount) for mount in mounts)
-        ]
+        cameras = [camera_on(state.ego, mount) for mount in mounts]
+        return [self.semantics_from(camera, state) for camera in cameras]
+
+    def semantics_from(self, camera: PinholeCamera, state: SceneState) -> NDArray[np.uint8]:
+        """What each pixel (H, W) of a camera's picture shows, as numbers of `Semantic`."""
+        return self._canvas(camera.size, 1).classes(self._drawn(camera, state), self._in_light(camera, state))
+
+    def distances_from(self, camera: PinholeCamera, state: SceneState) -> Floats:
+        """How far away (H, W) along its optical axis lies what a camera's picture shows, m."""
+        return self._canvas(camera.size, 1).distances(self._drawn(camera, state), self._in_light(camera, state))
+
+    def _in_light(self, camera: PinholeCamera, state: SceneState) -> Scene:
+        light, materials = self._atmosphere.in_weather(state.weather, camera.pose.x, camera.pose.y)
+        return Scene(materials, light, camera.view())
 
     def _canvas(self, size: tuple[int, int], samples: int) -> Canvas:
         key = *size, samples
         if key not in self._canvases:
+            if len(self._canvases) >= MOST_CANVASES:
+                del self._canvases[next(iter(self._canvases))]
             self._canvases[key] = Canvas(size, samples)
         return self._canvases[key]
 

@@ -116,6 +116,13 @@ class Canvas:
         _classes(self.sheet, self._room_of(drawn), drawn, scene, classes)
         return classes
 
+    def distances(self, drawn: Drawn, scene: Scene) -> Floats:
+        """How far away along the optical axis lies what each pixel (H, W) of it shows, m; the sky is kilometres away.
+        The canvas has one sample a pixel."""
+        _draw(self.sheet, self._room_of(drawn), drawn, scene)
+        with np.errstate(divide="ignore"):
+            return ONE / self.sheet.depths
+
     def _room_of(self, drawn: Drawn) -> Room:
         """Room for all triangles."""
         n = int(drawn.meshes.sizes[drawn.actors.meshes].sum()) + len(drawn.faces.triangles) + len(drawn.dome)

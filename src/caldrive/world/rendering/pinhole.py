@@ -13,7 +13,7 @@ from caldrive.compiled import Floats, f32
 from caldrive.datatypes import CameraConfig, Pose, VehicleState
 from caldrive.geometry import moved
 
-LEVEL = 0.1  # rad of pitch up to which the horizontal angle alone says what a picture covers
+LEVEL = 0.1  # rad of pitch and roll up to which the horizontal angle alone says what a picture covers
 ALL_AROUND = 1e3  # tangent of half an angle that covers everything ahead
 
 
@@ -65,6 +65,8 @@ class PinholeCamera:
     """Horizontal field of view, degrees."""
     size: tuple[int, int]
     """Width and height, pixels."""
+    roll: float = 0.0
+    """rad, + when its right side is down."""
 
     def __post_init__(self) -> None:
         """Raises ValueError for a picture that no camera takes, before room is made for it."""
@@ -86,7 +88,13 @@ class PinholeCamera:
         """Unit vectors to the right, down and ahead."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
         cp, sp = math.cos(self.pitch), math.sin(self.pitch)
-        return (s, -c, 0.0), (c * sp, s * sp, -cp), (c * cp, s * cp, sp)
+        right: tuple[float, ...] = (s, -c, 0.0)
+        down: tuple[float, ...] = (c * sp, s * sp, -cp)
+        if self.roll:
+            cr, sr = math.cos(self.roll), math.sin(self.roll)
+            pairs = list(zip(right, down, strict=True))
+            right, down = tuple(cr * r + sr * d for r, d in pairs), tuple(cr * d - sr * r for r, d in pairs)
+        return right, down, (c * cp, s * cp, sp)
 
     def view(self) -> View:
         """All of it, for compiled code."""
@@ -106,9 +114,13 @@ class PinholeCamera:
         )  # fmt: skip
 
     def frustum(self) -> Frustum:
-        """What the picture covers on the plane."""
+        """What the picture covers on the plane; where it may show what lies behind the eye, everything."""
         c, s = math.cos(self.pose.heading), math.sin(self.pose.heading)
-        tangent = math.tan(math.radians(self.fov) / 2) if abs(self.pitch) < LEVEL else ALL_AROUND
+        is_level = max(abs(self.pitch), abs(self.roll)) < LEVEL
+        tangent = math.tan(math.radians(self.fov) / 2) if is_level else ALL_AROUND
+        to_corner = math.atan(math.hypot(*self.size) / 2 / self.focal)
+        if not is_level and abs(self.pitch) + to_corner > math.pi / 2:
+            c = s = 0.0  # nothing is ahead and nothing aside
         return Frustum((self.pose.x, self.pose.y, self.height), (c, s), (-s, c), tangent)
 
 

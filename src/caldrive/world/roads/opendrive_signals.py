@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
 from caldrive.datatypes import KMH, SPEED_SIGNS, Pose
@@ -50,6 +50,8 @@ class Signals:
     junctions: frozenset[str]
     """Ids of those with lights."""
     dropped: Dropped
+    ids: dict[Approach, str] = field(default_factory=dict)
+    """The map's own id of the first light of each approach."""
 
 
 def read_signals(root: ET.Element) -> Signals:
@@ -60,7 +62,7 @@ def read_signals(root: ET.Element) -> Signals:
             reader.read(road, thing)
     lights = {approach: tuple(feet) for approach, feet in reader.lights.items()}
     junctions = frozenset(str(reader.junction_of(approach)) for approach in lights)
-    return Signals(tuple(reader.signs.values()), lights, junctions, reader.dropped)
+    return Signals(tuple(reader.signs.values()), lights, junctions, reader.dropped, reader.ids)
 
 
 def limit_on(thing: ET.Element) -> float | None:
@@ -111,6 +113,7 @@ class _Reader:
         self.dropped: Dropped = Counter()
         self.signs: dict[tuple[int, int, int], MapSign] = {}
         self.lights: defaultdict[Approach, list[Pose]] = defaultdict(list)
+        self.ids: dict[Approach, str] = {}
         self.references: defaultdict[str, list[Approach]] = defaultdict(list)
         for road in self.roads.values():
             for reference in road.findall("signals/signalReference"):
@@ -144,6 +147,7 @@ class _Reader:
         _, _, foot = self._place(road, thing)
         for approach in dict.fromkeys(approaches):
             self.lights[approach].append(foot)
+            self.ids.setdefault(approach, thing.get("id") or "")
 
     def _place(self, road: ET.Element, thing: ET.Element) -> tuple[Approach, Pose, Pose]:
         """For whom something is, where that is on the reference line, and where it stands."""

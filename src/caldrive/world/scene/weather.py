@@ -21,7 +21,7 @@ class Weather:
     """One of CARLA's weathers. Shares in percent."""
 
     id: int
-    """1 to 14."""
+    """1 to 14; 0 for one that is none of these."""
     name: str
     """CARLA's name."""
     cloudiness: float
@@ -66,6 +66,11 @@ def weather(id: int) -> Weather:
         names = ", ".join(f"{row.id} {row.name}" for row in WEATHERS.values())
         raise ValueError(f"found weather {id}, wanted 1 to 14: {names}")
     return WEATHERS[id]
+
+
+def as_weather(given: int | Weather) -> Weather:
+    """A weather, given itself or by its id. Raises ValueError for an unknown id."""
+    return given if isinstance(given, Weather) else weather(given)
 
 
 @dataclass(frozen=True)

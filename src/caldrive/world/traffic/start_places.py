@@ -28,12 +28,13 @@ def room(roads: RoadNetwork) -> int:
     return len(places) - int(np.max(near, initial=0))
 
 
-def free_places(roads: RoadNetwork, n: int, ego: Pose) -> list[tuple[Lane, float]]:
-    """Where a car may stand at the start, away from the ego. Raises ValueError where there is no room for n."""
+def free_places(roads: RoadNetwork, n: int, ego: Pose | None) -> list[tuple[Lane, float]]:
+    """Where a car may stand at the start, away from the ego if there is one. Raises ValueError where there is no room
+    for n."""
     free = []
     for lane, s in start_places(roads):
         place = lane.line.pose_at(s)
-        if math.hypot(place.x - ego.x, place.y - ego.y) > CLEAR_OF_EGO:
+        if ego is None or math.hypot(place.x - ego.x, place.y - ego.y) > CLEAR_OF_EGO:
             free.append((lane, s))
     if n > len(free):
         raise ValueError(

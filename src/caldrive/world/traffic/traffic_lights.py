@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +70,8 @@ class JunctionLights:
 
     def __init__(self, posts: tuple[LightPost, ...], rng: np.random.Generator) -> None:
         names = list(dict.fromkeys(post.approach for post in posts))
+        self.held: dict[int, LightState] = {}
+        """What posts are told to show from outside, by their numbers."""
         self.posts, self.approaches = posts, [names.index(post.approach) for post in posts]
         self.change(_first_phase(len(names), rng))
 
@@ -83,7 +85,13 @@ class JunctionLights:
 
     def states(self) -> list[LightState]:
         """What each post shows."""
-        return [self.phase.state if k == self.phase.approach else LightState.RED for k in self.approaches]
+        shown = [self.phase.state if k == self.phase.approach else LightState.RED for k in self.approaches]
+        return [self.held.get(i, state) for i, state in enumerate(shown)] if self.held else shown
+
+    def hold(self, held: Mapping[int, LightState]) -> None:
+        """Shows what somebody wants at some posts, by their numbers, and what is due at the others."""
+        self.held = dict(held)
+        self.change(replace(self.phase))  # an equal phase, but another: whoever looks for changes sees one
 
     def waiting(self, at_posts: list[bool]) -> list[bool]:
         """Whether somebody waits in each approach, from whether somebody does at each post."""
@@ -177,6 +185,8 @@ class TrafficLights:
         self.junctions = {name: JunctionLights(tuple(posts), rng) for name, posts in sorted(grouped.items())}
         self._at = _where([*self.junctions.values()]) if self.junctions else None
         self.rng, self.demand, self._time = rng, demand, 0.0
+        self.frozen: set[str] = set()
+        """Junctions that stay as they are."""
         self._unseen = np.zeros(sum(len(junction.posts) for junction in self.junctions.values()), dtype=bool)
 
     def step(self, time: float, cars: Iterable[VehicleState]) -> None:
@@ -190,10 +200,10 @@ class TrafficLights:
             waiting |= self._unseen
         self._time = time
         first, waits = 0, waiting.tolist()
-        for junction, busy in zip(self.junctions.values(), occupied.tolist(), strict=True):
+        for (name, junction), busy in zip(self.junctions.items(), occupied.tolist(), strict=True):
             last = first + len(junction.posts)
             phase = next_phase(junction.phase, time, junction.waiting(waits[first:last]), busy)
-            if phase is not junction.phase:
+            if phase is not junction.phase and name not in self.frozen:
                 junction.change(phase)
             first = last
 

@@ -13,8 +13,9 @@ import libsumo
 import numpy as np
 
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
-from caldrive.geometry import moved, to_local, wrap_angle
+from caldrive.geometry import to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
+from caldrive.world.traffic.guests import Guests, move_in_sumo
 from caldrive.world.traffic.incidents import Incident, Incidents
 from caldrive.world.traffic.start_places import free_places
 from caldrive.world.traffic.sumo_inputs import SumoLights, speed_caps
@@ -34,22 +35,21 @@ POSITION, PLACE, ANGLE, SPEED = 0x42, 0x39, 0x43, 0x40  # numbers that libsumo h
 LONGEST_WAIT = 60.0  # s until a car that is stuck is moved elsewhere
 OUT_OF_SIGHT, BESIDE = 70.0, 25.0  # m from the ego, where its camera looks and elsewhere
 LONGEST_WAY, LAST_EDGES = 30, 6  # edges of a random way, and how many of it are left when it gets a new one
-OFF_ROAD = 15.0  # m from every lane, where no car minds the ego any more: SUMO looks for its lane no farther away
 CHECK_EVERY = 20  # steps, from one look after cars that are stuck or near the end of their way to the next
 
 
 class Traffic:
     """One SUMO simulation of n cars; there can be one in a process, until its `release`.
 
-    cars: all but the ego, as of the last step; heights: of the roads under them (m), by their ids, where roads run
-    above each other. Raises ValueError for more cars than the town holds, RuntimeError where another simulation is
-    under way.
+    ego: None where there is none. guests: cars that others drive, and that may come and go. cars: all but these and the
+    ego, as of the last step; heights: of the roads under them (m), by their ids, where roads run above each other.
+    Raises ValueError for more cars than the town holds, RuntimeError where another simulation is under way.
     """
 
     def __init__(
-        self, roads: RoadNetwork, n: int, seed: int, dt: float, ego: VehicleState, lights: TrafficLights
+        self, roads: RoadNetwork, n: int, seed: int, dt: float, ego: VehicleState | None, lights: TrafficLights
     ) -> None:
-        free_places(roads, n, ego.pose)  # too many cars are refused before anything is made for each
+        free_places(roads, n, ego.pose if ego else None)  # too many cars are refused before anything is made for each
         self.roads, self.rng, self.dt = roads, np.random.default_rng(seed), dt
         self.size = {f"car{i}": MODELS[int(self.rng.integers(len(MODELS)))] for i in range(n)}
         starts = self._random_places(n, ego)
@@ -57,6 +57,7 @@ class Traffic:
         self._capped: set[str] = set()  # cars that are told how fast they may drive
         self._incidents = Incidents(self.rng)
         self._braking: str | None = None  # who brakes harder than others may
+        self.guests = Guests(roads)
         take_sumo(self)
         try:
             with one_sentence(roads.name):
@@ -65,10 +66,13 @@ class Traffic:
             self.close()  # nobody else can: there is no traffic yet
             raise
 
-    def _start(self, seed: int, ego: VehicleState, starts: Sequence[tuple[Lane, float]], lights: TrafficLights) -> None:
+    def _start(
+        self, seed: int, ego: VehicleState | None, starts: Sequence[tuple[Lane, float]], lights: TrafficLights
+    ) -> None:
         """Begins the simulation, with each car at its place."""
         load_sumo(self.roads, self.dt, seed)
-        self._add_ego(ego)
+        if ego is not None:
+            self._add_ego(ego)
         for name, (lane, s) in zip(self.size, starts, strict=True):
             self._add(name, lane, s)
         self._lights = SumoLights(lights)
@@ -84,9 +88,9 @@ class Traffic:
         if has_sumo(self):
             stop_sumo()
 
-    def _random_places(self, n: int, ego: VehicleState) -> list[tuple[Lane, float]]:
+    def _random_places(self, n: int, ego: VehicleState | None) -> list[tuple[Lane, float]]:
         """Random free places for n cars, away from the ego."""
-        free = free_places(self.roads, n, ego.pose)
+        free = free_places(self.roads, n, ego.pose if ego else None)
         return [free[int(i)] for i in self.rng.permutation(len(free))[:n]]
 
     def _random_way(self, edge: str) -> list[str]:
@@ -121,7 +125,7 @@ class Traffic:
         libsumo.vehicle.setLength(EGO, ego.length)
         libsumo.vehicle.setWidth(EGO, ego.width)
 
-    def step(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
+    def step(self, time: float, ego: VehicleState | None, people: Sequence[PedestrianState]) -> None:
         """Moves the cars on by dt, under what the lights show now; time in s."""
         if not has_sumo(self):
             raise RuntimeError(
@@ -131,23 +135,23 @@ class Traffic:
         with one_sentence(self.roads.name):
             self._move(time, ego, people)
 
-    def _move(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
+    def _move(self, time: float, ego: VehicleState | None, people: Sequence[PedestrianState]) -> None:
         self._lights.update()
-        front = moved(ego.pose, forward=ego.length / 2)
-        angle = 90.0 - math.degrees(ego.pose.heading)
-        libsumo.vehicle.moveToXY(EGO, "", -1, front.x, front.y, angle, keepRoute=2, matchThreshold=OFF_ROAD)
+        if ego is not None:
+            move_in_sumo(EGO, ego)
+        self.guests.move()
         self._cap_speeds(time, ego, people)
         libsumo.simulationStep()
         if round(time / self.dt) % CHECK_EVERY == 0:
             self._look_after(ego)
         self.cars = self._read()
 
-    def _cap_speeds(self, time: float, ego: VehicleState, people: Sequence[PedestrianState]) -> None:
+    def _cap_speeds(self, time: float, ego: VehicleState | None, people: Sequence[PedestrianState]) -> None:
         """Lets cars stop before people on the road and where something happens to them, and those drive on that had
         to."""
         caps = speed_caps(self.cars, people)
         present = {car.id for car in self.cars}
-        incident = self._incidents.step(time, self.dt, ego, self.cars)
+        incident = self._incidents.step(time, self.dt, ego, self.cars) if ego is not None else None
         if incident is not None and incident.name in present:
             caps[incident.name] = min(incident.allowed(time), caps.get(incident.name, math.inf))
         self._brake_hard(incident, present)
@@ -168,7 +172,7 @@ class Traffic:
             libsumo.vehicle.setDecel(name, max(incident.brake, libsumo.vehicle.getDecel(name)))
         self._braking = name
 
-    def _look_after(self, ego: VehicleState) -> None:
+    def _look_after(self, ego: VehicleState | None) -> None:
         """Gives cars near the end of their way a new one, and moves those that are stuck while nobody sees it."""
         present = set(libsumo.vehicle.getIDList())
         for name in self.size:
@@ -181,21 +185,23 @@ class Traffic:
             if near_end and libsumo.vehicle.getRoadID(name) == way[index]:
                 libsumo.vehicle.setRoute(name, self._random_way(way[index]))
             stuck = libsumo.vehicle.getWaitingTime(name) > LONGEST_WAIT
-            if stuck and not in_sight(ego, libsumo.vehicle.getPosition(name)):
+            if stuck and not (ego is not None and in_sight(ego, libsumo.vehicle.getPosition(name))):
                 libsumo.vehicle.unsubscribe(name)  # SUMO would miss it at its next step
                 libsumo.vehicle.remove(name)
 
     def _read(self) -> tuple[VehicleState, ...]:
         """All cars as SUMO has them. It is asked once for all of them: that takes a quarter of the time."""
+        driven = {EGO, *self.guests.known}
         names, watched = libsumo.vehicle.getIDList(), libsumo.vehicle.getAllSubscriptionResults()
-        new = [name for name in names if name not in watched and name != EGO]
+        names = [name for name in names if name not in driven]
+        new = [name for name in names if name not in watched]
         if new:
             for name in new:
                 libsumo.vehicle.subscribe(name, (POSITION, ANGLE, SPEED, *([] if self.roads.is_flat else [PLACE])))
             watched = libsumo.vehicle.getAllSubscriptionResults()
         if not self.roads.is_flat:
-            self.heights = {name: float(watched[name][PLACE][2]) for name in names if name != EGO}
-        return tuple(self._state(name, watched[name]) for name in names if name != EGO)
+            self.heights = {name: float(watched[name][PLACE][2]) for name in names}
+        return tuple(self._state(name, watched[name]) for name in names)
 
     def _state(self, name: str, values: Mapping[int, Any]) -> VehicleState:
         """A car in our axes."""

@@ -1,0 +1,1 @@
+"""The bridge to CARLA: its client drives in the embedded world."""

@@ -1,0 +1,73 @@
+"""The actors of an episode: what every one of them has, and the kinds that only stand, look or listen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from caldrive.carla_bridge.axes import Placement, compose
+from caldrive.carla_bridge.server.layouts import ActorDescription, AttributeValue, BoundingBox, Vector
+from caldrive.carla_bridge.server.snapshot import NOTHING, Triple
+
+STILL: tuple[Triple, Triple, Triple] = (NOTHING, NOTHING, NOTHING)
+NOBODY = 0  # the owner of what is there from the beginning
+LABELS = {  # CARLA's semantic classes, by the beginning of an actor's id
+    "vehicle.": 14, "walker.": 12, "traffic.traffic_light": 7, "traffic.": 8, "static.": 20,
+}  # fmt: skip
+ActorLayout = tuple[int, int, ActorDescription, BoundingBox, bytes, bytes]
+
+
+@dataclass(eq=False)
+class Actor:
+    """Something in the world with a number. Its place is relative to its parent's where it has one."""
+
+    id: int
+    description: ActorDescription
+    own_place: Placement
+    owner: int = NOBODY
+    """Whose it is: the number of a client's connection."""
+    parent: Actor | None = None
+    box: BoundingBox = BoundingBox()
+    stream: int = 0
+    """The number of its stream, 0 for none."""
+    sign: str = ""
+    """Of a sign or a light: its id on the map."""
+    motion: tuple[Triple, Triple, Triple] = STILL
+    """Velocity (m/s), angular velocity (degrees/s) and acceleration (m/s²), in CARLA's axes."""
+    children: list[Actor] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        """Its type, such as `vehicle.tesla.model3`."""
+        return self.description.id
+
+    @property
+    def place(self) -> Placement:
+        """Where it is."""
+        return compose(self.parent.place, self.own_place) if self.parent else self.own_place
+
+    def put(self, place: Placement) -> None:
+        """It is at a place from now on; as CARLA has it, that is relative for what is attached."""
+        self.own_place = place
+
+    def layout(self, token: bytes) -> ActorLayout:
+        """As it goes to a client."""
+        label = next((label for begin, label in LABELS.items() if self.kind.startswith(begin)), None)
+        tags = bytes([label]) if label is not None else b""
+        return self.id, self.parent.id if self.parent else 0, self.description, self.box, tags, token
+
+
+def box_of(size: Sequence[float], up: float) -> BoundingBox:
+    """A box of a length, width and height in m, whose middle is so far above its actor's origin."""
+    length, width, height = size
+    return BoundingBox(Vector(0.0, 0.0, up), Vector(length / 2, width / 2, height / 2))
+
+
+def description(id: str, **attributes: str) -> ActorDescription:
+    """Of an actor that no client asked for."""
+    return ActorDescription(0, id, tuple(AttributeValue(name, 4, value) for name, value in attributes.items()))
+
+
+@dataclass(eq=False)
+class Prop(Actor):
+    """A thing that a client put somewhere: it can be hit, and is not drawn."""

@@ -1,0 +1,108 @@
+"""Batches: many commands in one call, each answered by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from caldrive.carla_bridge.server.actor_calls import ActorCalls
+from caldrive.carla_bridge.server.calls import call
+from caldrive.carla_bridge.server.layouts import ActorDescription, Layout, Transform, placement
+from caldrive.carla_bridge.server.server import Server
+from caldrive.carla_bridge.server.vehicle_calls import VehicleCalls
+from caldrive.carla_bridge.server.wire import Refusal
+
+MOST_COMMANDS = 10_000
+DEEPEST = 8  # commands that follow on commands
+
+
+class Spawn(Layout, frozen=True):
+    """Command 0."""
+
+    description: ActorDescription
+    transform: Transform
+    parent: tuple[bool | int, ...]
+    attachment: int = 0
+    socket: str = ""
+    then: tuple[Any, ...] = ()
+
+
+class Batches:
+    """They do what the single calls do."""
+
+    def __init__(self, server: Server, actors: ActorCalls, vehicles: VehicleCalls) -> None:
+        self._server, self._actors = server, actors
+        self._commands: dict[int, tuple[Callable[..., Any], type[Any]]] = {}
+        for number, method in (
+            (1, actors.destroy), (2, vehicles.control), (3, vehicles.ackermann), (4, vehicles.walk),
+            (5, vehicles.set_physics), (6, actors.set_transform), (8, actors.set_velocity), (9, actors.set_turning),
+            (10, actors.add_impulse), (11, actors.add_force), (12, actors.turn), (13, actors.turn),
+            (14, actors.simulate_physics), (15, actors.enable_gravity), (16, vehicles.autopilot),
+            (17, vehicles.debug_telemetry), (19, actors.set_location), (21, vehicles.set_light),
+        ):  # fmt: skip
+            self._commands[number] = method, _arguments(method)
+        self._commands[7] = self._follow, tuple[int, Transform, float]
+        self._commands[18] = self._set_lights, tuple[int, int]
+        self._vehicles = vehicles
+
+    @call("apply_batch", is_bare=True)
+    def apply(self, caller: int, commands: list[Any], tick: bool = False) -> list[Any]:
+        """All of them in their order; the number of its actor for each, or why it was refused."""
+        if len(commands) > MOST_COMMANDS:
+            raise Refusal(f"found {len(commands)} commands in a batch, wanted {MOST_COMMANDS} at most: send fewer")
+        results = [self._result(caller, command) for command in commands]
+        if tick and self._server.rules.synchronous:
+            self._server.tick()
+        return results
+
+    def _result(self, caller: int, command: Any) -> Any:
+        try:
+            return ((1, self._do(caller, command, 0, 0)),)
+        except Refusal as refusal:
+            return ((0, (str(refusal),)),)
+
+    def _do(self, caller: int, command: Any, future: int, depth: int) -> int:
+        """A command; future: the actor that is meant by number 0. Raises Refusal."""
+        match command:
+            case [[0, payload]] if depth < DEEPEST:
+                return self._spawn(caller, _converted(payload, Spawn), depth)
+            case [[int(index), [int(number), *rest]]] if index in self._commands:
+                method, kind = self._commands[index]
+                number = number or future
+                method(caller, *_converted([number, *rest], kind))
+                return number
+        raise Refusal("found a command that caldrive does not know, wanted one of CARLA 0.9.16: leave it out")
+
+    def _spawn(self, caller: int, asked: Spawn, depth: int) -> int:
+        parent = int(asked.parent[1]) if asked.parent[:1] == (True,) and len(asked.parent) > 1 else None
+        actor = self._actors.spawn(caller, asked.description, placement(asked.transform), parent)
+        for command in asked.then:
+            self._do(caller, command, actor.id, depth + 1)
+        return actor.id
+
+    def _follow(self, caller: int, number: int, at: Transform, speed: float) -> None:
+        self._vehicles.follow_crowd(number, at, speed)
+
+    def _set_lights(self, caller: int, number: int, flags: int) -> None:
+        self._vehicles.set_vehicle_lights(caller, number, (flags,))
+
+
+def _arguments(method: Callable[..., Any]) -> Any:
+    """What a call takes, as a tuple's type."""
+    from typing import get_type_hints
+
+    hints = get_type_hints(method)
+    kinds = tuple(hint for name, hint in hints.items() if name not in ("caller", "return"))
+    return tuple[kinds]  # type: ignore[valid-type]
+
+
+def _converted(payload: Any, kind: Any) -> Any:
+    """A command's payload in its type. Raises Refusal."""
+    try:
+        return msgspec.convert(payload, kind)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise Refusal(
+            f"found a command whose values it does not take ({error}), wanted those of CARLA 0.9.16"
+        ) from error

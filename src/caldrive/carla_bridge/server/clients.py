@@ -1,0 +1,109 @@
+"""The connections that make calls: what comes is answered in its order, one connection after the other."""
+
+from __future__ import annotations
+
+import selectors
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from caldrive.carla_bridge.server.outbox import Gone, Log, Outbox, accepted
+from caldrive.carla_bridge.server.wire import BrokenMessage, Request, Requests, answer
+
+RECEIVED = 2**18  # bytes that are read at once
+MOST_CLIENTS = 128
+MOST_UNREAD = 64_000_000  # bytes of answers that a client may leave unread
+
+
+@dataclass(eq=False)
+class Client:
+    """One of them."""
+
+    number: int
+    socket: socket.socket
+    outbox: Outbox
+    requests: Requests = field(default_factory=Requests)
+
+
+class Clients:
+    """All of them, by number. serve: gives the result of a call; gone: hears who has gone."""
+
+    def __init__(
+        self, waiting: socket.socket, log: Log, serve: Callable[[int, Request], Any], gone: Callable[[int], None]
+    ) -> None:
+        self._waiting, self._log, self._serve, self._gone = waiting, log, serve, gone
+        self.port = int(waiting.getsockname()[1])
+        self._clients: set[Client] = set()
+        self._next = 1
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(waiting, selectors.EVENT_READ)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._clients)
+
+    def fileno(self) -> int:
+        """For whoever waits until something happens here."""
+        return self._selector.fileno()
+
+    def poll(self) -> None:
+        """Lets in who comes, answers what they ask, and sends on what waits."""
+        for key, events in self._selector.select(0):
+            if key.data is None:
+                self._let_in()
+            else:
+                self._attend(key.data, events)
+
+    def _let_in(self) -> None:
+        while (connection := accepted(self._waiting)) is not None:
+            if len(self._clients) >= MOST_CLIENTS:
+                self._log(f"a client was turned away, as there are {MOST_CLIENTS}")
+                connection.close()
+                continue
+            client = Client(self._next, connection, Outbox(connection))
+            self._next += 1
+            self._clients.add(client)
+            self._selector.register(connection, selectors.EVENT_READ, client)
+
+    def _attend(self, client: Client, events: int) -> None:
+        """Reads what a client asks for, and sends what it has to get."""
+        try:
+            if events & selectors.EVENT_WRITE:
+                client.outbox.flush()
+            if events & selectors.EVENT_READ:
+                self._hear(client)
+            if client.outbox.waiting > MOST_UNREAD:
+                raise BrokenMessage("it does not read its answers")
+            writes = selectors.EVENT_WRITE if client.outbox.waiting else 0
+            self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
+        except Gone:
+            self._let_go(client)
+        except BrokenMessage as error:
+            self._log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
+            self._let_go(client)
+
+    def _hear(self, client: Client) -> None:
+        try:
+            received = client.socket.recv(RECEIVED)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            raise Gone from error
+        if not received:
+            raise Gone
+        for request in client.requests.feed(received):
+            client.outbox.put([answer(request.id, self._serve(client.number, request))])
+
+    def _let_go(self, client: Client) -> None:
+        self._selector.unregister(client.socket)
+        client.socket.close()
+        self._clients.discard(client)
+        self._gone(client.number)
+
+    def close(self) -> None:
+        """Ends all of them."""
+        for client in self._clients:
+            client.socket.close()
+        self._selector.close()
+        self._waiting.close()

@@ -1,0 +1,220 @@
+"""The server: one thread that owns the world, answers calls in their order, and ticks between them.
+
+A step belongs to whoever calls `tick_cue` in synchronous mode, and to the clock otherwise. While no client is there the
+world stands at its beginning, so that a program that comes alone finds the same world each time.
+"""
+
+from __future__ import annotations
+
+import math
+import selectors
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+from caldrive.carla_bridge.server import snapshot
+from caldrive.carla_bridge.server.actors import Actor
+from caldrive.carla_bridge.server.calls import Call, serve
+from caldrive.carla_bridge.server.clients import Clients
+from caldrive.carla_bridge.server.episode import Episode
+from caldrive.carla_bridge.server.layouts import Settings
+from caldrive.carla_bridge.server.maps import Maps, signal_ids
+from caldrive.carla_bridge.server.outbox import listening
+from caldrive.carla_bridge.server.sensors import Senses, SensorActor
+from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.carla_bridge.server.streams import WORLD, Streams
+from caldrive.carla_bridge.server.wire import Request, refused
+from caldrive.world.town import Town, load_town
+
+FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
+GRACE = 0.5  # s after a call until the clock begins to move the world: time to ask for synchronous mode
+LONGEST_GRACE = 5.0  # s after the first call
+LONGEST_STEP = 1.0  # s
+
+
+class Server:
+    """One world, and all clients of it. Raises OSError where a port is taken, ValueError for a town that cannot be."""
+
+    def __init__(self, settings: ServerSettings) -> None:
+        self.settings, self.maps = settings, Maps(settings.maps)
+        self.rules, self.rules_owner = Settings(), 0
+        self.frame, self._episodes = 0, 0
+        self.managers: dict[int, tuple[str, int]] = {}
+        """Traffic managers that clients run: port to host and owner."""
+        self.calls: dict[str, Call] = {}
+        self._first_call, self._next_step = math.inf, math.inf  # s by the clock
+        self._senses: Senses | None = None
+        self._latest: Sequence[Any] | None = None
+        self.clients = Clients(listening(settings.host, settings.port), self.log, self._result, self._forget)
+        try:
+            self.streams = Streams(listening(settings.host, settings.port + 1), self.log, self._newcomer)
+        except BaseException:
+            self.clients.close()
+            raise
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self.clients, selectors.EVENT_READ, self.clients.poll)
+        self._selector.register(self.streams, selectors.EVENT_READ, self.streams.poll)
+        self.episode = self._begin(settings.town)
+
+    def log(self, sentence: str) -> None:
+        """Says something on stderr, if anybody can hear it."""
+        with suppress(OSError, ValueError):
+            print(f"caldrive: {sentence}", file=sys.stderr, flush=True)
+
+    def _begin(self, town_name: str) -> Episode:
+        """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
+        town = load_town(town_name)
+        self._episodes += 1
+        episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads))
+        if self._senses is None or self._town is not town:
+            if self._senses is not None:
+                self._senses.close()
+            self._town: Town = town
+            self._senses = Senses(town)
+        return episode
+
+    def begin(self, town: str | None = None) -> None:
+        """Ends the episode and begins another, in the same town or another. Raises ValueError, OSError or RuntimeError
+        where there cannot be one; then the old town begins again."""
+        old = self.episode.town.name
+        load_town(town or old)  # a map that cannot be read costs nothing
+        for actor in self.sensors():
+            self.streams.close_stream(actor.stream)
+        self.episode.close()
+        try:
+            self.episode = self._begin(town or old)
+        except (ValueError, OSError, RuntimeError):
+            self.episode = self._begin(old)
+            raise
+        finally:
+            self._note()
+
+    def warm_up(self) -> None:
+        """Does once what clients would have to wait for the first time; then all is as it was."""
+        assert self._senses is not None
+        self.episode.step(FREE_STEP)
+        self._senses.warm_up(self.episode)
+        self.begin()
+
+    def run(self) -> None:
+        """Serves until it is interrupted."""
+        while True:
+            self.turn()
+
+    def turn(self, patience: float = 1.0) -> None:
+        """Waits until something happens, at most some seconds, and does it."""
+        for key, _ in self._selector.select(self._patience(patience)):
+            key.data()
+        now = time.monotonic()
+        if self.clients and not self.rules.synchronous and now >= self._next_step:
+            self._next_step = max(self._next_step + (self.rules.delta or FREE_STEP), now)
+            self._tick_by_the_clock()
+
+    def _tick_by_the_clock(self) -> None:
+        """A step that no client asked for. A fault costs the episode, not the server."""
+        try:
+            self.tick()
+        except Exception as error:  # nobody else could hear of it
+            self.log(
+                f"found a fault of the program ({type(error).__name__}: {error}), wanted none: the town begins again"
+            )
+            self.begin()
+
+    def _patience(self, most: float) -> float:
+        """s until the clock moves the world."""
+        if not self.clients or self.rules.synchronous:
+            return most
+        return min(most, max(0.0, self._next_step - time.monotonic()))
+
+    def _result(self, caller: int, request: Request) -> Any:
+        """What a call gives. A fault of the program costs one call, not all clients."""
+        if self.frame == 0 and not self.rules.synchronous:
+            now = time.monotonic()
+            self._first_call = min(self._first_call, now)
+            self._next_step = min(now + GRACE, self._first_call + LONGEST_GRACE)
+        try:
+            return serve(self.calls, caller, request)
+        except Exception as error:  # the last door before everybody's world
+            self.log(f"found a fault of the program in {request.method} ({type(error).__name__}: {error}), wanted none")
+            found = self.calls[request.method]
+            return refused(f"found a fault of caldrive in {request.method}, wanted none: see its output", found.is_void)
+
+    def _forget(self, client: int) -> None:
+        """A client has gone, and what was its own goes with it."""
+        self.managers = {port: row for port, row in self.managers.items() if row[1] != client}
+        if self.settings.keep:
+            return
+        if self.rules_owner == client:
+            self.rules, self.rules_owner, self._next_step = Settings(), 0, time.monotonic()
+        if not self.clients:  # who comes next finds what the first one found
+            self.rules, self.frame, self._episodes = Settings(), 0, 0
+            self._first_call = self._next_step = math.inf
+            self.begin(self.settings.town)
+            return
+        for actor in self.episode.all(Actor):
+            if actor.owner == client and self.episode.get(actor.id) is actor:
+                self.destroy(actor)
+
+    def set_rules(self, rules: Settings, owner: int) -> None:
+        """Other settings from now on, of a client that they go with."""
+        self.rules, self.rules_owner, self._next_step = rules, owner, time.monotonic()
+
+    def sensors(self) -> list[SensorActor]:
+        """Those that clients have spawned."""
+        return self.episode.all(SensorActor)
+
+    def destroy(self, actor: Actor) -> None:
+        """An actor goes, with what is attached to it."""
+        for gone in self.episode.remove(actor):
+            if gone.stream:
+                self.streams.close_stream(gone.stream)
+
+    def tick(self) -> int:
+        """Moves the world on by a step and tells everybody; returns its frame."""
+        self.streams.settle()
+        self.frame += 1
+        self.episode.step(min(self.rules.delta or FREE_STEP, LONGEST_STEP))
+        self._note()
+        for sensor in self.sensors():
+            is_drawn = ".camera." in sensor.kind
+            if self.streams.is_wanted(sensor.stream) and not (is_drawn and self.rules.no_rendering):
+                self._hear_sensor(sensor)
+        return self.frame
+
+    def _hear_sensor(self, sensor: SensorActor) -> None:
+        """Sends what a sensor says. A fault costs its stream."""
+        assert self._senses is not None
+        try:
+            for message in self._senses.messages(sensor, self.episode, self.frame):
+                self.streams.send(sensor.stream, message)
+        except Exception as error:  # a place or a lens that nobody thought of
+            self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: its stream ends")
+            self.streams.close_stream(sensor.stream)
+
+    def _note(self) -> None:
+        """Tells everybody who is where."""
+        episode = self.episode
+        head = snapshot.world_head(episode.number, episode.time, episode.delta, episode.is_new)
+        episode.is_new = False
+        place = snapshot.header(snapshot.Sensor.WORLD, self.frame, episode.time)
+        self._latest = [b"".join((place, head, *episode.rows()))]
+        self.streams.send(WORLD, self._latest)
+
+    def _newcomer(self, stream: int) -> Sequence[Any] | None:
+        """What a new subscriber gets at once: the latest snapshot."""
+        if stream != WORLD:
+            return None
+        if self._latest is None:
+            self._note()
+        return self._latest
+
+    def close(self) -> None:
+        """Ends it all."""
+        self._selector.close()
+        self.clients.close()
+        self.streams.close()
+        self.episode.close()
+        if self._senses is not None:
+            self._senses.close()

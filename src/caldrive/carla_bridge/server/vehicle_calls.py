@@ -1,0 +1,250 @@
+"""The calls about vehicles, walkers and traffic lights."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+
+from caldrive.carla_bridge.server.actor_calls import ActorCalls, finite
+from caldrive.carla_bridge.server.calls import call
+from caldrive.carla_bridge.server.layouts import (
+    AckermannControl,
+    AckermannSettings,
+    BoundingBox,
+    PhysicsControl,
+    Transform,
+    Vector,
+    VehicleControl,
+    WalkerControl,
+    placement,
+)
+from caldrive.carla_bridge.server.lights import OFF, STATES, Light
+from caldrive.carla_bridge.server.server import Server
+from caldrive.carla_bridge.server.vehicles import Vehicle, physics_of, set_physics
+from caldrive.carla_bridge.server.walkers import FASTEST, Walker
+from caldrive.carla_bridge.server.wire import Refusal
+
+MOST_TIME = 1e6  # s that a light may show the same
+
+
+class VehicleCalls:
+    """They answer from one server; actors: finds them."""
+
+    def __init__(self, server: Server, actors: ActorCalls) -> None:
+        self._server, self._actors = server, actors
+
+    def _vehicle(self, number: int) -> Vehicle:
+        return self._actors.find(number, Vehicle)
+
+    def _light(self, number: int) -> Light:
+        return self._actors.find(number, Light)
+
+    @call("apply_control_to_vehicle")
+    def control(self, caller: int, number: int, control: VehicleControl) -> None:
+        """It holds until the next one."""
+        vehicle = self._vehicle(number)
+        vehicle.ackermann = None
+        vehicle.control = msgspec.structs.replace(
+            control, throttle=max(0.0, finite(control.throttle, 1.0)), steer=finite(control.steer, 1.0),
+            brake=max(0.0, finite(control.brake, 1.0)), gear=int(finite(control.gear, 100)),
+        )  # fmt: skip
+
+    @call("apply_ackermann_control_to_vehicle")
+    def ackermann(self, caller: int, number: int, control: AckermannControl) -> None:
+        """A speed and an angle of the wheels."""
+        names = ("steer", "steer_speed", "speed", "acceleration", "jerk")
+        values = (finite(getattr(control, name), 1e3) for name in names)
+        self._vehicle(number).ackermann = AckermannControl(*values)
+
+    @call("get_ackermann_controller_settings")
+    def ackermann_settings(self, caller: int, number: int) -> AckermannSettings:
+        """As they were set."""
+        return self._vehicle(number).ackermann_settings
+
+    @call("apply_ackermann_controller_settings")
+    def set_ackermann_settings(self, caller: int, number: int, settings: AckermannSettings) -> None:
+        """They are kept and read back; the controller has gains of its own."""
+        self._vehicle(number).ackermann_settings = settings
+
+    @call("get_physics_control")
+    def physics(self, caller: int, number: int) -> PhysicsControl:
+        """With the constants of the bicycle model."""
+        return physics_of(self._vehicle(number))
+
+    @call("apply_physics_control")
+    def set_physics(self, caller: int, number: int, physics: PhysicsControl) -> None:
+        """The mass and the steering count; the rest is read back."""
+        set_physics(self._vehicle(number), physics)
+
+    @call("get_vehicle_light_state")
+    def vehicle_lights(self, caller: int, number: int) -> tuple[int]:
+        """As they were set."""
+        return (self._vehicle(number).lights,)
+
+    @call("set_vehicle_light_state")
+    def set_vehicle_lights(self, caller: int, number: int, flags: tuple[int]) -> None:
+        """They are not drawn."""
+        self._vehicle(number).lights = flags[0] & 0xFFFFFFFF
+
+    @call("get_vehicle_light_states")
+    def all_vehicle_lights(self, caller: int) -> list[tuple[int, int]]:
+        """Of all vehicles of clients."""
+        return [(one.id, one.lights) for one in self._server.episode.all(Vehicle)]
+
+    @call("get_telemetry_data")
+    def telemetry(self, caller: int, number: int) -> tuple[Any, ...]:
+        """Speed and pedals; a bicycle model knows nothing of its wheels."""
+        vehicle = self._vehicle(number)
+        control, wheels = vehicle.control, [(0.0,) * 11 for _ in range(4)]
+        return abs(vehicle.state.speed), control.steer, control.throttle, control.brake, 0.0, 1, 0.3, wheels
+
+    @call("get_wheel_steer_angle")
+    def wheel_angle(self, caller: int, number: int, wheel: int) -> float:
+        """Degrees to the right."""
+        return -math.degrees(self._vehicle(number).state.steer_angle) if wheel < 2 else 0.0
+
+    @call("set_wheel_steer_direction")
+    def set_wheel_angle(self, caller: int, number: int, wheel: int, angle: float) -> None:
+        """Wheels turn with the steering alone."""
+
+    @call("get_wheel_pitch_angle")
+    def wheel_pitch(self, caller: int, number: int, wheel: int) -> float:
+        """Wheels are drawn as they are."""
+        return 0.0
+
+    @call("set_wheel_pitch_angle")
+    def set_wheel_pitch(self, caller: int, number: int, wheel: int, angle: float) -> None:
+        """Likewise."""
+
+    @call("set_actor_autopilot")
+    def autopilot(self, caller: int, number: int, is_on: bool) -> None:
+        """The client's own traffic manager drives."""
+
+    @call("open_vehicle_door")
+    @call("close_vehicle_door")
+    def door(self, caller: int, number: int, door: int) -> None:
+        """Doors stay closed."""
+
+    @call("show_vehicle_debug_telemetry")
+    def debug_telemetry(self, caller: int, number: int, is_on: bool) -> None:
+        """There is no screen."""
+
+    @call("apply_control_to_walker")
+    def walk(self, caller: int, number: int, control: WalkerControl) -> None:
+        """It holds until the next one."""
+        d = control.direction
+        direction = Vector(finite(d.x, 1e3), finite(d.y, 1e3), finite(d.z, 1e3))
+        walker = self._actors.find(number, Walker)
+        walker.control = WalkerControl(direction, finite(control.speed, FASTEST), control.jump)
+
+    def follow_crowd(self, number: int, at: Transform, speed: float) -> None:
+        """The client's crowd moves a walker."""
+        self._actors.find(number, Walker).follow(placement(at), finite(speed, FASTEST))
+
+    @call("get_bones_transform")
+    def bones(self, caller: int, number: int) -> tuple[list[Any]]:
+        """None: people are drawn as they are."""
+        return ([],)
+
+    @call("set_bones_transform")
+    def set_bones(self, caller: int, number: int, bones: Any) -> None:
+        """Likewise."""
+
+    @call("blend_pose")
+    def blend_pose(self, caller: int, number: int, share: float) -> None:
+        """Likewise."""
+
+    @call("get_pose_from_animation")
+    def pose_from_animation(self, caller: int, number: int) -> None:
+        """Likewise."""
+
+    @call("set_traffic_light_state")
+    def set_light(self, caller: int, number: int, state: int) -> None:
+        """It shows that as long as it lasts; a light that is off, or unknown, does as it would alone."""
+        light, keeper, time = self._light(number), self._server.episode.lights, self._server.episode.time
+        if state >= OFF:
+            keeper.reset(light, time)
+        elif state in STATES:
+            keeper.hold(light, STATES[state], time)
+
+    def _set_time(self, number: int, place: int, seconds: float) -> None:
+        light = self._light(number)
+        times = list(light.times)
+        times[place] = max(0.0, finite(seconds, MOST_TIME))
+        light.times = (times[0], times[1], times[2])
+
+    @call("set_traffic_light_green_time")
+    def set_green(self, caller: int, number: int, seconds: float) -> None:
+        """How long a green that a client asked for lasts."""
+        self._set_time(number, 0, seconds)
+
+    @call("set_traffic_light_yellow_time")
+    def set_yellow(self, caller: int, number: int, seconds: float) -> None:
+        """Likewise."""
+        self._set_time(number, 1, seconds)
+
+    @call("set_traffic_light_red_time")
+    def set_red(self, caller: int, number: int, seconds: float) -> None:
+        """Likewise."""
+        self._set_time(number, 2, seconds)
+
+    @call("freeze_traffic_light")
+    def freeze(self, caller: int, number: int, is_frozen: bool) -> None:
+        """The lights of its junction stay as they are."""
+        self._server.episode.lights.freeze(self._light(number), is_frozen)
+
+    @call("freeze_all_traffic_lights")
+    def freeze_all(self, caller: int, is_frozen: bool) -> None:
+        """All lights stay as they are."""
+        for light in self._server.episode.lights.actors:
+            self._server.episode.lights.freeze(light, is_frozen)
+
+    @call("reset_traffic_light_group")
+    def reset(self, caller: int, number: int) -> None:
+        """The lights of a junction do as they would alone."""
+        self._server.episode.lights.reset(self._light(number), self._server.episode.time)
+
+    @call("reset_all_traffic_lights")
+    def reset_all(self, caller: int) -> None:
+        """Likewise all of them."""
+        for light in self._server.episode.lights.actors:
+            self._server.episode.lights.reset(light, self._server.episode.time)
+
+    @call("get_group_traffic_lights")
+    def group(self, caller: int, number: int) -> list[int]:
+        """The lights of its junction, with itself."""
+        return [one.id for one in self._server.episode.lights.of_junction(self._light(number))]
+
+    @call("get_light_boxes")
+    def light_boxes(self, caller: int, number: int) -> list[BoundingBox]:
+        """The box of its lamps, in the world."""
+        at = self._light(number).place
+        return [BoundingBox(Vector(at.x, -at.y, 3.0), Vector(0.2, 0.2, 0.5))]
+
+    def require_no_more(self) -> None:
+        """Raises Refusal for what only Unreal has."""
+        raise Refusal("found a vehicle model of CARLA's own, wanted the bicycle model that caldrive has: leave it out")
+
+    @call("enable_carsim")
+    def carsim(self, caller: int, number: int, file: str = "") -> None:
+        """Not here."""
+        self.require_no_more()
+
+    @call("use_carsim_road")
+    def carsim_road(self, caller: int, number: int, is_on: bool = False) -> None:
+        """Not here."""
+        self.require_no_more()
+
+    @call("enable_chrono_physics")
+    def chrono(
+        self, caller: int, number: int, substeps: int = 0, step: float = 0.0, vehicle: str = "", power: str = "",
+        tire: str = "", base: str = "",
+    ) -> None:  # fmt: skip
+        """Not here."""
+        self.require_no_more()
+
+    @call("restore_physx_physics")
+    def physx(self, caller: int, number: int) -> None:
+        """There is one model only."""

@@ -1,0 +1,131 @@
+"""One call of each kind through CARLA's client; every line asserts what programs rely on."""
+
+from __future__ import annotations
+
+import math
+
+import carla
+import pytest
+
+from tests.carla_bridge.server.programs.session import Listener, connect, spawned, straight, synchronous
+
+
+def main() -> None:
+    client = connect()
+    world = client.get_world()
+    synchronous(world)
+    town = world.get_map()
+    points = straight(world)
+    look_at_the_map(world, town)
+    car = spawned(world, "vehicle.lincoln.mkz_2020", points[0])
+    imu = Listener(spawned(world, "sensor.other.imu", carla.Transform(), car))
+    assert world.try_spawn_actor(world.get_blueprint_library().find("vehicle.audi.tt"), points[0]) is None
+    frame = world.tick()
+    assert abs(imu.at(frame).accelerometer.z - 9.81) < 0.01
+    assert imu.at(world.tick()).compass == imu.at(world.tick()).compass
+    assert car.bounding_box.extent.x > car.bounding_box.extent.y > 0.5
+    drive(world, car)
+    physics(world, car)
+    lights(world, car)
+    weather(world)
+    walker = spawned(world, "walker.pedestrian.0004", points[3])
+    world.tick()
+    walker.apply_control(carla.WalkerControl(carla.Vector3D(1.0, 0.0, 0.0), 1.5))
+    before = walker.get_location()
+    for _ in range(10):
+        world.tick()
+    assert abs(walker.get_location().distance(before) - 1.5) < 0.1
+    refuse(world, car)
+    assert walker.destroy()
+    assert car.destroy()
+    world.tick()
+    assert not world.get_actors().filter("vehicle.*")
+    assert client.get_world().id == world.id
+    assert client.reload_world().id != world.id
+
+
+def look_at_the_map(world: carla.World, town: carla.Map) -> None:
+    assert len(town.get_topology()) > 20
+    points = town.get_spawn_points()
+    for point in points[::17]:
+        waypoint = town.get_waypoint(point.location)
+        assert waypoint.transform.location.distance(point.location) < 1.0
+        turned = math.radians(waypoint.transform.rotation.yaw - point.rotation.yaw)
+        assert math.cos(turned) > 0.9
+    assert world.get_actors().filter("traffic.speed_limit*")
+
+
+def drive(world: carla.World, car: carla.Vehicle) -> None:
+    car.apply_control(carla.VehicleControl(throttle=1.0))
+    start, ahead = car.get_location(), car.get_transform().get_forward_vector()
+    for _ in range(20):
+        world.tick()
+    moved = car.get_location() - start
+    assert moved.x * ahead.x + moved.y * ahead.y > 3.0
+    assert car.get_control().throttle == 1.0
+    assert car.get_velocity().length() > 3.0
+    car.set_target_velocity(carla.Vector3D(0.0, 0.0, 0.0))
+    car.apply_control(carla.VehicleControl(brake=1.0))
+    for _ in range(10):
+        world.tick()
+    assert car.get_velocity().length() < 0.1
+    car.apply_ackermann_control(carla.VehicleAckermannControl(speed=4.0))
+    for _ in range(60):
+        world.tick()
+    assert abs(car.get_velocity().length() - 4.0) < 0.7
+
+
+def physics(world: carla.World, car: carla.Vehicle) -> None:
+    control = car.get_physics_control()
+    assert len(control.wheels) == 4
+    control.mass = 2000.0
+    car.apply_physics_control(control)
+    assert car.get_physics_control().mass == 2000.0
+    car.set_simulate_physics(False)
+    there = world.get_map().get_spawn_points()[9]
+    car.set_transform(there)
+    world.tick()
+    assert car.get_location().distance(there.location) < 0.1
+    car.set_simulate_physics(True)
+
+
+def lights(world: carla.World, car: carla.Vehicle) -> None:
+    found = world.get_actors().filter("traffic.traffic_light*")
+    assert len(found) > 3
+    light = found[0]
+    assert light.id in [one.id for one in light.get_group_traffic_lights()]
+    light.set_state(carla.TrafficLightState.Yellow)
+    light.freeze(True)
+    world.tick()
+    assert light.get_state() == carla.TrafficLightState.Yellow
+    assert light.is_frozen()
+    light.freeze(False)
+    ways = light.get_affected_lane_waypoints()
+    assert ways
+    stop = ways[0].transform
+    stop.location.z = 0.3
+    car.set_target_velocity(carla.Vector3D())
+    car.set_transform(stop)
+    light.set_state(carla.TrafficLightState.Red)
+    light.freeze(True)
+    world.tick()
+    world.tick()
+    assert car.is_at_traffic_light()
+    assert car.get_traffic_light().id == light.id
+    assert car.get_traffic_light_state() == carla.TrafficLightState.Red
+    world.reset_all_traffic_lights()
+
+
+def weather(world: carla.World) -> None:
+    world.set_weather(carla.WeatherParameters.HardRainSunset)
+    world.tick()
+    assert world.get_weather().precipitation == 100.0
+
+
+def refuse(world: carla.World, car: carla.Vehicle) -> None:
+    with pytest.raises(RuntimeError, match=r"found sensor\.lidar\.ray_cast"):
+        spawned(world, "sensor.lidar.ray_cast", carla.Transform(), car)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""CARLA's own client, unchanged, against the server: both are processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PORT, MANAGER = 24640, 24650
+ROOT = Path(__file__).parents[3]
+PATIENCE = 900.0  # s
+pytestmark = pytest.mark.skipif(find_spec("carla") is None, reason="needs the wheel of CARLA's client")
+
+
+def environment() -> dict[str, str]:
+    path = os.pathsep.join((str(ROOT / "src"), str(ROOT), os.environ.get("PYTHONPATH", "")))
+    return {"HOME": str(ROOT), **os.environ, "PYTHONPATH": path}
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """What a server says that runs until the last test."""
+    said = tmp_path_factory.mktemp("server") / "said.txt"
+    command = [sys.executable, "-m", "caldrive", "serve-carla", "--port", str(PORT)]
+    with said.open("wb") as file, subprocess.Popen(command, env=environment(), stderr=file, stdout=file) as process:
+        deadline = time.monotonic() + PATIENCE
+        while "may connect" not in said.read_text():
+            assert process.poll() is None, said.read_text()
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        yield said
+        assert process.poll() is None, said.read_text()
+        process.terminate()
+    assert "found a fault" not in said.read_text()
+
+
+def start(program: str, *arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", f"tests.carla_bridge.server.programs.{program}", str(PORT), *arguments]
+    return subprocess.Popen(
+        command, env=environment(), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def run(program: str, *arguments: str) -> Any:
+    """What a program prints as JSON."""
+    with start(program, *arguments) as process:
+        said, complaints = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, complaints
+    return json.loads(said) if said.strip().startswith("{") else said
+
+
+def test_cameras_come_in_step_with_ticks_and_show_what_they_should(server: Path) -> None:
+    found = run("cameras")
+    assert found["moved"] > 1.0
+    assert found["speed"] > 2.0
+    assert found["spread"] > 20  # a picture of something
+    assert {1, 11} <= set(found["labels"])  # road and sky
+    assert 2.0 < found["below"] < 8.0  # m to the road in the lowest row
+    assert found["sky"] > 900.0
+    assert found["fov"] == 90.0
+    assert found["latitude_error"] < 1e-7
+    assert found["longitude_error"] < 1e-7
+
+
+def test_the_same_program_gets_the_same_images(server: Path) -> None:
+    assert run("cameras") == run("cameras")
+
+
+def test_every_kind_of_call_works_through_the_client(server: Path) -> None:
+    run("everything")
+
+
+def test_the_clients_traffic_manager_and_crowd_drive_and_walk(server: Path) -> None:
+    found = run("traffic", str(MANAGER))
+    assert min(found["cars"]) > 3.0
+    assert max(found["walkers"]) > 2.0
+
+
+def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server: Path) -> None:
+    for k in range(5):
+        with start("cameras") as process:
+            time.sleep(0.15 * (k + 1))
+            process.kill()
+    assert run("cameras")["moved"] > 1.0

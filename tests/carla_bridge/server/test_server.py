@@ -1,0 +1,184 @@
+"""The server over its sockets, without CARLA's client."""
+
+from __future__ import annotations
+
+import math
+import socket
+from collections.abc import Iterator
+
+import msgpack
+import pytest
+
+from caldrive.carla_bridge.server.serve import make_server
+from caldrive.carla_bridge.server.server import Server
+from caldrive.carla_bridge.server.settings import ServerSettings
+from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, positions
+
+PORT = 24610
+SETTINGS = ServerSettings(town="town01", port=PORT)
+WORLD = 1
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    made = make_server(SETTINGS)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[WireClient]:
+    """In synchronous mode, alone in a fresh episode."""
+    made = WireClient(server)
+    made.synchronous()
+    yield made
+    made.leave()
+
+
+def place(client: WireClient, k: int) -> tuple[float, float, float]:
+    """The k-th of spawn points on a straight street, each before the next: x, y, yaw."""
+    _, points = client.call("get_map_info")
+    flat = [(x, y, yaw) for (x, y, _), (_, yaw, _) in points]
+    first = next(k for k in range(len(flat)) if is_straight(flat[k : k + 4]))
+    return flat[first + k]
+
+
+def is_straight(points: list[tuple[float, float, float]]) -> bool:
+    (x, y, yaw), *others = points
+    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    return all(abs((there[0] - x) * c + (there[1] - y) * s - 12.0 * k) < 0.5 for k, there in enumerate(others, 1))
+
+
+def control(throttle: float = 0.0, brake: float = 0.0) -> list[object]:
+    return [throttle, 0.0, brake, False, False, False, 0]
+
+
+def test_a_vehicle_under_throttle_moves_from_tick_to_tick(client: WireClient) -> None:
+    car, reader = client.spawn("vehicle.tesla.model3", place(client, 0)), Reader(client, WORLD)
+    reader.message()
+    client.call("apply_control_to_vehicle", car, control(throttle=1.0))
+    before = after = (0.0, 0.0)
+    for k in range(21):
+        client.call("tick_cue")
+        after = positions(reader.message())[car]
+        before = after if k == 0 else before
+    assert 3.0 < abs(after[0] - before[0]) + abs(after[1] - before[1]) < 10.0
+
+
+def test_two_vehicles_do_not_stand_in_one_place(client: WireClient) -> None:
+    client.spawn("vehicle.tesla.model3", place(client, 0))
+    with pytest.raises(RefusedError, match="Spawn failed because of collision at spawn position"):
+        client.spawn("vehicle.audi.tt", place(client, 0))
+
+
+def test_what_a_client_spawned_goes_with_it_and_so_does_synchronous_mode(server: Server, client: WireClient) -> None:
+    other = WireClient(server)
+    car = other.spawn("vehicle.tesla.model3", place(client, 0))
+    other.synchronous(0.05)
+    other.leave()
+    assert client.call("get_actors_by_id", [car]) == []
+    assert client.call("get_episode_settings")[0] is False
+
+
+def run_of_20_ticks(server: Server) -> list[bytes]:
+    client = WireClient(server)
+    client.synchronous()
+    client.spawn("vehicle.tesla.model3", place(client, 0))
+    client.spawn("walker.pedestrian.0002", place(client, 3))
+    reader = Reader(client, WORLD)
+    snapshots = [reader.message()]
+    for _ in range(20):
+        client.call("tick_cue")
+        snapshots.append(reader.message())
+    client.leave()
+    return snapshots
+
+
+def test_whoever_comes_alone_finds_the_same_world_byte_for_byte(server: Server) -> None:
+    assert run_of_20_ticks(server) == run_of_20_ticks(server)
+
+
+@pytest.mark.parametrize("bytes_", [b"\xc1", b"\x91" * 5000, msgpack.packb([7]), msgpack.packb({}), bytes(range(256))])
+def test_broken_messages_cost_their_own_connection_only(server: Server, client: WireClient, bytes_: bytes) -> None:
+    with socket.create_connection(("127.0.0.1", PORT)) as broken:
+        broken.send(bytes_)
+        broken.settimeout(5)
+        for _ in range(3):
+            server.turn(0.05)
+        assert broken.recv(10) == b""
+    assert client.call("version") == "0.9.16"
+
+
+def test_a_call_that_nobody_knows_is_refused_and_the_next_one_served(client: WireClient) -> None:
+    with pytest.raises(RefusedError, match="fly"):
+        client.call("fly", 1, 2)
+    assert client.call("version") == "0.9.16"
+
+
+def test_a_light_shows_what_a_client_wants_until_its_time_is_over(server: Server, client: WireClient) -> None:
+    light = server.episode.lights.actors[0]
+    client.call("set_traffic_light_green_time", light.id, 1.0)
+    client.call("set_traffic_light_state", light.id, 2)
+    assert light.state.value == "green"
+    assert light.held is not None
+    for _ in range(15):
+        client.call("tick_cue")
+    assert light.held is None
+
+
+def test_all_lights_can_be_frozen_on_green(server: Server, client: WireClient) -> None:
+    for light in server.episode.lights.actors:
+        client.call("set_traffic_light_state", light.id, 2)
+        client.call("freeze_traffic_light", light.id, True)
+    for _ in range(150):
+        client.call("tick_cue")
+    assert {light.state.value for light in server.episode.lights.actors} == {"green"}
+
+
+def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+    then = [[[2, [0, control(throttle=1.0)]]]]
+    spawn = [[0, [[1, "vehicle.audi.tt", []], [[x, y, 0.3], [0.0, yaw, 0.0]], [False], 0, "", then]]]
+    results = client.call("apply_batch", [spawn, spawn, [[1, [999_999]]], [[99, []]]], False)
+    assert [result[0][0] for result in results] == [1, 0, 1, 0]
+    reader, car = Reader(client, WORLD), results[0][0][1]
+    assert car not in positions(reader.message())  # it has not been told yet
+    seen = []
+    for _ in range(10):
+        client.call("tick_cue")
+        seen.append(positions(reader.message())[car])
+    assert seen[0] != seen[-1]
+
+
+def test_settings_that_cannot_be_are_refused(client: WireClient) -> None:
+    with pytest.raises(RefusedError, match="fixed_delta_seconds"):
+        client.synchronous(0.0)
+
+
+def test_places_and_controls_that_are_no_numbers_do_no_harm(client: WireClient) -> None:
+    with pytest.raises(RefusedError, match="finite"):
+        client.spawn("vehicle.tesla.model3", (float("nan"), 0.0, 0.0))
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
+    client.call("apply_control_to_vehicle", car, [float("nan"), 1e300, -1e300, False, False, False, 10**9])
+    client.call("tick_cue")
+    client.call("tick_cue")
+
+
+def test_a_taken_port_is_told(server: Server) -> None:
+    with pytest.raises(OSError, match="--port"):
+        make_server(SETTINGS)
+
+
+def test_a_vehicle_that_hits_a_standing_one_says_so(client: WireClient) -> None:
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
+    sensor = client.call("spawn_actor_with_parent", [1, "sensor.other.collision", []],
+                         [[0, 0, 0], [0, 0, 0]], car, 0, "")[0]  # fmt: skip
+    x, y, yaw = place(client, 1)
+    client.spawn("vehicle.carlamotors.firetruck", (x, y, yaw))
+    reader = Reader(client, sensor + 1)
+    client.call("apply_control_to_vehicle", car, control(throttle=1.0))
+    for _ in range(40):
+        client.call("tick_cue")
+    own, other, impulse = msgpack.unpackb(reader.message()[48:])
+    assert (own[0], other[2][1]) == (car, "vehicle.carlamotors.firetruck")
+    assert sum(part**2 for part in impulse) > 1000.0**2
