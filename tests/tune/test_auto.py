@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from caldrive.commands.tune import Tune
-from caldrive.control.presets import DEFAULT, controller_config
+from caldrive.control.presets import DEFAULT, PAPER, controller_config
 from caldrive.progress import silent
 from caldrive.tune import auto
 from caldrive.tune.auto import missing_trials, run_trial, tune
@@ -47,6 +47,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 def test_the_first_trial_is_the_controller_as_it_is(quick: list[float], tmp_path: Path) -> None:
     tune(replace(RIGHT, trials=1), DEFAULT, tmp_path)
     assert quick[0] == DEFAULT.longitudinal.turn_speed
+    tune(replace(RIGHT, trials=1), PAPER, tmp_path / "paper")  # which has no such limit: the range's end
+    assert quick[-3] == 45.0
 
 
 def test_a_search_finds_what_costs_less(quick: list[float], tmp_path: Path) -> None:

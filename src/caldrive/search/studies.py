@@ -11,7 +11,7 @@ import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from caldrive.affordances import BY_NAME
 from caldrive.parallel.trials import Draw, abandon, open_journal, require_optuna
@@ -65,7 +65,7 @@ def open_study(out: Path, config: SearchConfig, task: str, draw: int = 0) -> Any
     """A task's study, made if need be. draw: the trial that it is asked for next. Raises ValueError where the journal
     is damaged."""
     spec, pruner = BY_NAME[task], {"n_startup_trials": STARTUP_TRIALS, "n_warmup_steps": evaluation_step(config, 2)}
-    direction = "maximize" if spec.discrete else "minimize"
+    direction: Literal["maximize", "minimize"] = "maximize" if spec.discrete else "minimize"
     return open_journal(out, task, direction, Draw(config.sampler, config.seed, draw), pruner)
 
 

@@ -21,7 +21,7 @@ from caldrive.parallel.processes import parallel_map
 from caldrive.parallel.trials import Draw, abandon, claim_folder, mend_journal, open_journal, require_optuna
 from caldrive.progress import Progress, silent
 from caldrive.tune.config import TuneConfig
-from caldrive.tune.constants import constants, controller_toml, values_of, with_values
+from caldrive.tune.constants import Constant, constants, controller_toml, values_of, with_values
 from caldrive.tune.cost import Cost, cost, mean_cost
 from caldrive.tune.maneuvers import MANEUVERS, Maneuver, drive, route
 
@@ -91,8 +91,8 @@ def missing_trials(out: Path, config: TuneConfig, controller: ControlConfig) -> 
     study = open_study(out, config)
     abandon(study)
     if not study.get_trials(deepcopy=False):
-        present = values_of(controller)
-        study.enqueue_trial({name: present[name] for name in config.constants})
+        present, searched = values_of(controller), _searched(config, controller)
+        study.enqueue_trial({name: constant.position_of(present[name]) for name, constant in searched.items()})
     done = {trial.user_attrs[NUMBER] for trial in _finished(study)}
     return [number for number in range(config.trials) if number not in done]
 
@@ -115,8 +115,13 @@ def run_trial(out: Path, config: TuneConfig, controller: ControlConfig, number: 
 
 def _drawn(trial: Any, config: TuneConfig, controller: ControlConfig) -> dict[str, float]:
     """The constants of a trial, each from its slider's range."""
+    searched = _searched(config, controller)
+    return {name: trial.suggest_float(name, constant.low, constant.high) for name, constant in searched.items()}
+
+
+def _searched(config: TuneConfig, controller: ControlConfig) -> dict[str, Constant]:
     by_name = {constant.name: constant for constant in constants(controller)}
-    return {name: trial.suggest_float(name, by_name[name].low, by_name[name].high) for name in config.constants}
+    return {name: by_name[name] for name in config.constants}
 
 
 def _finished(study: Any) -> list[Any]:

@@ -155,9 +155,10 @@ class TuningPage:
         """Finds the ultimate gain, and puts the gains of the rule on the sliders."""
         from nicegui import run
 
-        if self._ultimate is None:
-            self._ultimate = await run.cpu_bound(find_ultimate, speed_response, DT)
-        ultimate = self._ultimate
+        ultimate = self._ultimate or await run.cpu_bound(find_ultimate, speed_response, DT)
+        if ultimate is None:  # the server stops
+            return
+        self._ultimate = ultimate
         gains = proposed(rule, ultimate, getattr(self.controller.longitudinal, which))
         values = {"kp": gains.kp, "ki": gains.ki, "kd": gains.kd}
         found.set_text(
@@ -193,7 +194,8 @@ class TuningPage:
 
         settings = {"A": self.kept, "B": self.controller} if self.kept else {"": self.controller}
         name = self.maneuver
-        return {key: await run.cpu_bound(drive_named, name, config) for key, config in settings.items()}
+        drives = {key: await run.cpu_bound(drive_named, name, config) for key, config in settings.items()}
+        return {key: one for key, one in drives.items() if one is not None}  # none while the server stops
 
     def _show(self) -> None:
         for chart, element in zip(CHARTS, self.charts, strict=True):
