@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from caldrive.tune.road import CAR, turn_route
+from caldrive.tune.road import CAR, IMAGE, turn_route
 from caldrive.tune.road import SingleRoad as StraightRoad
 
-__all__ = ["CAR", "StraightRoad", "turn_route"]
+__all__ = ["CAR", "IMAGE", "StraightRoad", "turn_route"]
