@@ -1,4 +1,4 @@
-"""`caldrive town`: a sheet of camera images, a plan with coordinates, or both."""
+"""`caldrive town`: a sheet of camera images, a plan with coordinates, a map for other programs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import pytest
 from PIL import Image as Picture
 
 from caldrive.cli import main
+from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.roads.opendrive_writer import write_opendrive
 from tests.command_line import run_json
 
 
@@ -60,7 +62,16 @@ def test_town_writes_both(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.png", "sheet.png"]
 
 
+def test_town_writes_the_map_alone_where_only_that_is_asked_for(tmp_path: Path, town02: RoadNetwork) -> None:
+    answer = run_json("town", "--town", "town02", "--opendrive", str(tmp_path / "a" / "town02.xodr"))
+    assert answer["opendrive"] == str(tmp_path / "a" / "town02.xodr")
+    assert (tmp_path / "a" / "town02.xodr").read_bytes() == write_opendrive(town02)
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["town02.xodr"]
+
+
 MISTAKES = {
+    "a map of another kind": (["--opendrive", "town01.xml"], "type --opendrive town01.xodr"),
+    "a map of a map": (["--opendrive", "b.xodr", "--town", "a.xodr"], "type --town town01"),
     "a plan of another kind": (["--plan", "plan.pdf"], "ends in .png"),
     "a sheet of another kind beside a plan": (["--plan", "plan.png", "--sheet", "sheet.jpg"], "ends in .png"),
     "a plan too small to read": (["--plan", "plan.png", "--width", "100"], "type --width 1600"),

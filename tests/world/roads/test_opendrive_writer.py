@@ -41,15 +41,14 @@ def test_a_number_names_one_thing(root: ET.Element) -> None:
 def test_a_connecting_road_begins_and_ends_on_the_lanes_that_it_joins(root: ET.Element) -> None:
     roads = {road.get("id"): road for road in root.findall("road")}
     for road in (road for road in roads.values() if road.get("junction") != "-1"):
-        for kind, s in (("predecessor", 0.0), ("successor", number(road, "length"))):
-            link = road.find(f"link/{kind}")
-            assert link is not None
-            street = roads[link.get("elementId")]
-            end = pose_on_line(street, number(street, "length") if link.get("contactPoint") == "end" else 0.0)
-            lane = int(road.find(f"lanes/laneSection/right/lane[@id='-1']/link/{kind}").get("id"))  # type: ignore[union-attr, arg-type]
-            there, here = moved(end, left=math.copysign(2.0, lane)), pose_on_line(road, s)
-            assert (here.x, here.y) == pytest.approx((there.x, there.y), abs=1e-4)
-            assert math.cos(here.heading - there.heading) * -math.copysign(1, lane) == pytest.approx(1, abs=1e-6)
+        lane = road.findall("lanes/laneSection/right/lane/link")[0]
+        for end, joined in zip(road.findall("link/*"), lane, strict=True):
+            street, theirs = roads[end.get("elementId")], number(joined, "id")
+            at = pose_on_line(street, number(street, "length") if end.get("contactPoint") == "end" else 0.0)
+            there = moved(at, left=math.copysign(2.0, theirs))
+            here = pose_on_line(road, 0.0 if end.tag == "predecessor" else number(road, "length"))
+            assert (here.x, here.y) == pytest.approx((there.x, there.y), abs=1e-3)
+            assert math.cos(here.heading - there.heading) == pytest.approx(-math.copysign(1, theirs), abs=1e-6)
 
 
 def test_every_lane_that_is_joined_exists(root: ET.Element) -> None:

@@ -49,7 +49,7 @@ def pieces_of(line: Polyline, first: float | None = None, last: float | None = N
     line = _moved_out(line)
     ways = [line.headings[0] if first is None else first, *line.headings, line.headings[-1] if last is None else last]
     steps = [0.0, *np.diff(line.s), 0.0]
-    pieces, at = list[Piece](), Pose(*line.points[0].tolist(), heading=ways[0])
+    pieces, at = list[Piece](), Pose(line.points[0, 0], line.points[0, 1], ways[0])
     for k, (x, y) in enumerate(line.points.tolist()):
         turn, here = wrap_angle(ways[k + 1] - ways[k]), Pose(x, y, ways[k])
         before, after = (_reach(turn, step) for step in steps[k : k + 2])

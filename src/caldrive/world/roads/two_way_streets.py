@@ -52,7 +52,7 @@ def find_streets(roads: RoadNetwork) -> tuple[list[Street], list[Turn]]:
 
 def _turns(roads: RoadNetwork, start: Lane) -> Iterator[Turn]:
     """All ways from a lane to those after the next junction."""
-    ways = [(roads.lanes[id],) for id in start.successors]
+    ways: list[tuple[Lane, ...]] = [(roads.lanes[id],) for id in start.successors]
     for way in ways:  # which grows as it is read
         if way[-1].internal:
             ways += [(*way, roads.lanes[id]) for id in way[-1].successors]

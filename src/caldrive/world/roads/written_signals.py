@@ -32,6 +32,8 @@ class Signal:
     """m along the reference line."""
     t: float
     """m to its left."""
+    foot: Pose
+    """The same place on the ground, with the heading of the traffic that it is for."""
     lanes: tuple[int, int]
     """The first and the last lane that it is for."""
     posts: tuple[LightPost, ...] = ()
@@ -57,7 +59,7 @@ def _light(id: str, network: OpenDriveNetwork, posts: tuple[LightPost, ...]) -> 
     street, foot = network.streets[places[0][0]], posts[0].stands_at
     _, t = street.locate(foot.x, foot.y)
     lanes = sorted(lane for _, lane in places)
-    return Signal(id, street.id, street.length if lanes[0] < 0 else 0.0, t, (lanes[0], lanes[-1]), posts)
+    return Signal(id, street.id, street.length if lanes[0] < 0 else 0.0, t, foot, (lanes[0], lanes[-1]), posts)
 
 
 def _sign(id: str, roads: RoadNetwork, network: OpenDriveNetwork, foot: Pose, limit: int) -> Signal:
@@ -65,7 +67,7 @@ def _sign(id: str, roads: RoadNetwork, network: OpenDriveNetwork, foot: Pose, li
     street_id, lane = network.places[roads.lane_at(foot)[0].id]
     street = network.streets[street_id]
     lanes = (-len(street.right.widths), -1) if lane < 0 else (1, len(street.left.widths))
-    return Signal(id, street_id, *street.locate(foot.x, foot.y), lanes, limit=limit)
+    return Signal(id, street_id, *street.locate(foot.x, foot.y), foot, lanes, limit=limit)
 
 
 def add_signals(road: ET.Element, signals: Iterable[Signal]) -> None:
@@ -83,6 +85,9 @@ def add_signals(road: ET.Element, signals: Iterable[Signal]) -> None:
             orientation="+" if along else "-", hOffset="0" if along else f"{math.pi:.6f}",
         )  # fmt: skip
         ET.SubElement(element, "validity", fromLane=str(signal.lanes[0]), toLane=str(signal.lanes[1]))
+        x, y, heading = (f"{number:.6f}" for number in (signal.foot.x, signal.foot.y, signal.foot.heading))
+        # Without it CARLA's client moves posts away that stand near a turn.
+        ET.SubElement(element, "positionInertial", x=x, y=y, z="0", hdg=heading, pitch="0", roll="0")
 
 
 def add_controllers(root: ET.Element, network: OpenDriveNetwork, signals: Iterable[Signal]) -> dict[int, list[str]]:
