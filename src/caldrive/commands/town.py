@@ -1,4 +1,4 @@
-"""The verb that draws a town: on a contact sheet of camera images, or as a plan to choose places from."""
+"""The verb that shows a town: on a contact sheet of camera images, as a plan to choose places from, or as a map."""
 
 from __future__ import annotations
 
@@ -9,31 +9,42 @@ from typing import Any
 from caldrive.commands.answer import Answer, Output
 from caldrive.progress import Progress
 
-SHEET = Path("out/town.png")  # where neither a sheet nor a plan was asked for by name
+SHEET = Path("out/town.png")  # where nothing was asked for by name
 
 
 @dataclass(frozen=True, kw_only=True)
 class Town(Output):
-    """Draw a town: a contact sheet, or a plan to choose places from."""
+    """Show a town: a contact sheet, a plan to choose places from, or an OpenDRIVE map for other programs."""
 
     town: str = "town01"
     """town01, town02, random:SEED, random-wide:SEED or an OpenDRIVE file."""
     sheet: Path | None = None
-    """A PNG file for camera images of the town in all weathers; out/town.png where no --plan is asked for."""
+    """A PNG file for camera images of the town in all weathers; out/town.png where nothing else is asked for."""
     plan: Path | None = None
     """A PNG file for a map with lanes, lights, signs and coordinates, to choose the places of caldrive drive --from
     X,Y --to X,Y from."""
+    opendrive: Path | None = None
+    """A .xodr file for the town as an OpenDRIVE map, which carla.Map and other programs read."""
     width: int | None = None
-    """The width of each file in pixels."""
+    """The width of each picture in pixels."""
     randomised: int = 0
     """Show the town on the sheet in so many random looks, as recordings have them, instead of the weathers."""
 
     def run(self, progress: Progress) -> Answer:
-        """Draws; answers with where the pictures are."""
-        sheet = SHEET if self.sheet is None and self.plan is None else self.sheet
+        """Draws and writes; answers with where the files are."""
+        sheet = SHEET if self.sheet is None and self.plan is None and self.opendrive is None else self.sheet
         self._check(sheet)
         values: dict[str, Any] = {"town": self.town}
         lines = []
+        if self.opendrive is not None:
+            from caldrive.files import write_whole
+            from caldrive.world.roads.opendrive_writer import write_opendrive
+            from caldrive.world.roads.towns import load_roads
+
+            progress("writing the map", 0.0)
+            write_whole(self.opendrive, write_opendrive(load_roads(self.town)))
+            values |= {"opendrive": str(self.opendrive)}
+            lines.append(f"{self.town} as an OpenDRIVE map: {self.opendrive}")
         if self.plan is not None:
             from caldrive.visualization.town_plan import write_plan
 
@@ -55,9 +66,15 @@ class Town(Output):
         """Raises ValueError or OSError where a file cannot be, before the other one is written."""
         from caldrive.checks import MOST_LOOKS, require_within, require_writable_file
 
-        for option, path in (("--sheet", sheet), ("--plan", self.plan)):
+        files = (("--sheet", sheet, ".png"), ("--plan", self.plan, ".png"), ("--opendrive", self.opendrive, ".xodr"))
+        for option, path, ending in files:
             if path is not None:
-                require_writable_file(path, option, ".png")
+                require_writable_file(path, option, ending)
+        if self.opendrive is not None and self.town.endswith(".xodr"):
+            raise ValueError(
+                f"found --opendrive for {self.town}, wanted a town of caldrive's own, as it is such a map already: "
+                "type --town town01"
+            )
         if self.plan is not None and sheet is not None and self.plan.resolve() == sheet.resolve():
             raise ValueError(f"found {sheet} for the sheet and for the plan, wanted two files: type another --plan")
         require_within("--randomised", self.randomised, 0, MOST_LOOKS, 8)

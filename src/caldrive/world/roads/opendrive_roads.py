@@ -22,6 +22,7 @@ from caldrive.world.roads.rounded_line import Piece, pieces_of, thinned
 from caldrive.world.roads.two_way_streets import Edge, Street, Turn, find_streets
 
 STEPS = 10  # after which a place beside a line is found; each leaves a third of the error, or less
+LEAST_STEP, LEAST_STEP_INSIDE = 0.5, 0.1  # m from one point of a street to the next, and within a junction
 GRAIN = 1.0  # m along a kerb from one look for a sidewalk to the next
 
 
@@ -150,7 +151,9 @@ def opendrive_roads(roads: RoadNetwork) -> OpenDriveNetwork:
         for street, at_end in ((before, from_lane < 0), (after, to_lane > 0)):
             first, last = streets[street].ends
             streets[street] = replace(streets[street], ends=(first, number) if at_end else (number, last))
-        connecting.append(_connecting(roads, (id, number), turn, (streets[before], from_lane), (streets[after], to_lane)))
+        connecting.append(
+            _connecting(roads, (id, number), turn, (streets[before], from_lane), (streets[after], to_lane))
+        )
     return OpenDriveNetwork(tuple(streets), tuple(connecting), junctions, places)
 
 
@@ -160,18 +163,22 @@ def _junction_of(turn: Turn) -> str:
 
 
 def _street(roads: RoadNetwork, id: int, street: Street) -> OpenDriveRoad:
-    points = thinned(np.concatenate([edge[0].line.points for edge in street.ahead]))
+    points = thinned(np.concatenate([edge[0].line.points for edge in street.ahead]), LEAST_STEP)
     line = Polyline(points + street.ahead[0][0].width / 2 * mitres(points))
     return _with_sidewalks(roads, OpenDriveRoad(id, line, Side(street.ahead), Side(street.back)))
 
 
 def _connecting(
-    roads: RoadNetwork, ids: tuple[int, int], turn: Turn, start: tuple[OpenDriveRoad, int], end: tuple[OpenDriveRoad, int]
+    roads: RoadNetwork,
+    ids: tuple[int, int],
+    turn: Turn,
+    start: tuple[OpenDriveRoad, int],
+    end: tuple[OpenDriveRoad, int],
 ) -> OpenDriveRoad:
     """The road of a turn. ids: its own and its junction's; start, end: the streets that it joins, and their lanes."""
     first, last = start[0].end_of(start[1], leaving=True), end[0].end_of(end[1], leaving=False)
     inside = np.concatenate([lane.line.points for lane in turn.inside])[1:-1]
-    line = Polyline(thinned(np.array([(first.x, first.y), *inside, (last.x, last.y)])))
+    line = Polyline(thinned(np.array([(first.x, first.y), *inside, (last.x, last.y)]), LEAST_STEP_INSIDE))
     road = OpenDriveRoad(
         ids[0], line, Side((turn.inside[:1],)), junction=ids[1], headings=(first.heading, last.heading)
     )

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.roads.opendrive_roads import Contact, OpenDriveNetwork, OpenDriveRoad, Side, opendrive_roads
+from caldrive.world.roads.opendrive_roads import Contact, OpenDriveNetwork, OpenDriveRoad, opendrive_roads
 from caldrive.world.roads.rounded_line import Piece
 from caldrive.world.roads.written_signals import add_controllers, add_signals, signals_of
 from caldrive.world.scene.ground import SOLID_NEAR_JUNCTION

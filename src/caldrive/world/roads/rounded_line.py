@@ -1,22 +1,24 @@
-"""A polyline as a smooth OpenDRIVE reference line: straight pieces, and one parametric cubic around each corner.
+"""A polyline as a smooth OpenDRIVE reference line: straight pieces, and one parametric cubic around each corner (ASAM
+OpenDRIVE 1.8, section 9.6).
 
-A corner is rounded as `Polyline.heading_at` turns there, over BLEND metres to either side, but never so far that the
-line leaves the polyline by more than MOST_OFF (ASAM OpenDRIVE 1.8, section 9.6: paramPoly3).
+A corner is rounded over BLEND metres to either side, as `Polyline.heading_at` turns there, and less where the line
+would leave the polyline by more than MOST_OFF. It is moved out before by half of what the rounding cuts off: then the
+line runs as far outside the polyline between the corners as inside at them.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Points, Pose
-from caldrive.geometry import BLEND, Polyline, moved, to_local, wrap_angle
+from caldrive.geometry import BLEND, Polyline, mitres, moved, to_local, wrap_angle
 
-LEAST_STEP = 0.25  # m; points nearer to the one before say more about rounding to centimetres than about the road
-MOST_OFF = 0.03  # m
+MOST_OFF = 0.04  # m
 STRAIGHT = 1e-4  # rad
 _NODES, _WEIGHTS = (values / 2 for values in np.polynomial.legendre.leggauss(8))
 
@@ -32,33 +34,42 @@ class Piece:
     """Coefficients (4, 2) of u and v by p in [0, 1], constant first, in the frame of the start; None for a line."""
 
 
-def thinned(points: Points) -> Points:
-    """Points (N, 2) without those nearer than LEAST_STEP to the one before; the first and the last stay."""
+def thinned(points: Points, least: float) -> Points:
+    """Points (N, 2) without those nearer than so many metres to the one before, whose direction says more about their
+    rounding to centimetres than about the road; the first and the last stay."""
     kept = [points[0]]
     for point in points[1:-1]:
-        if np.hypot(*(point - kept[-1])) > LEAST_STEP < np.hypot(*(points[-1] - point)):
+        if np.hypot(*(point - kept[-1])) > least < np.hypot(*(points[-1] - point)):
             kept.append(point)
     return np.array([*kept, points[-1]])
 
 
 def pieces_of(line: Polyline, first: float | None = None, last: float | None = None) -> list[Piece]:
     """The pieces of a line. first, last: headings (rad) in which it starts and ends, else those of its ends."""
+    line = _moved_out(line)
     ways = [line.headings[0] if first is None else first, *line.headings, line.headings[-1] if last is None else last]
     steps = [0.0, *np.diff(line.s), 0.0]
-    pieces, at = list[Piece](), Pose(*line.points[0], ways[0])
-    for k, corner in enumerate(line.points):
-        turn = wrap_angle(ways[k + 1] - ways[k])
-        reach = min(BLEND, 4 * MOST_OFF / max(abs(turn), STRAIGHT))  # an arc leaves its corner by reach * turn / 4
-        before, after = (min(reach, step / 2) for step in steps[k : k + 2])
-        if abs(turn) < STRAIGHT:
-            before = after = 0.0
-        here = Pose(*corner, ways[k])
-        start, end = moved(here, -before), moved(here, turn=turn)
-        pieces += _straight(at, start)
-        at = moved(end, after)
+    pieces, at = list[Piece](), Pose(*line.points[0].tolist(), heading=ways[0])
+    for k, (x, y) in enumerate(line.points.tolist()):
+        turn, here = wrap_angle(ways[k + 1] - ways[k]), Pose(x, y, ways[k])
+        before, after = (_reach(turn, step) for step in steps[k : k + 2])
+        pieces += _straight(at, moved(here, -before))
+        at = moved(moved(here, turn=turn), after)
         if before + after > 0:
-            pieces.append(_corner(start, at))
+            pieces.append(_corner(moved(here, -before), at))
     return pieces
+
+
+def _reach(turn: float, step: float) -> float:
+    """How far from a corner its rounding begins (m), on a step of some length."""
+    return min(BLEND, step / 2, MOST_OFF / abs(turn / 8)) if abs(turn) > STRAIGHT else 0.0
+
+
+def _moved_out(line: Polyline) -> Polyline:
+    """A line with its corners moved out: an arc cuts off reach * turn / 4."""
+    turns, steps = [0.0, *map(wrap_angle, np.diff(line.headings)), 0.0], np.pad(np.diff(line.s), 1).tolist()
+    reaches = [(_reach(turn, a) + _reach(turn, b)) / 2 for turn, (a, b) in zip(turns, pairwise(steps), strict=True)]
+    return Polyline(line.points - (np.array(reaches) * turns / 8)[:, None] * mitres(line.points))
 
 
 def _straight(start: Pose, end: Pose) -> list[Piece]:

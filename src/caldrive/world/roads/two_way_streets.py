@@ -53,12 +53,11 @@ def find_streets(roads: RoadNetwork) -> tuple[list[Street], list[Turn]]:
 def _turns(roads: RoadNetwork, start: Lane) -> Iterator[Turn]:
     """All ways from a lane to those after the next junction."""
     ways = [(roads.lanes[id],) for id in start.successors]
-    while ways:
-        *inside, last = ways.pop(0)
-        if last.internal:
-            ways += [(*inside, last, roads.lanes[id]) for id in last.successors]
+    for way in ways:  # which grows as it is read
+        if way[-1].internal:
+            ways += [(*way, roads.lanes[id]) for id in way[-1].successors]
         else:
-            yield Turn(start, tuple(inside), last)
+            yield Turn(start, way[:-1], way[-1])
 
 
 def _edges(roads: RoadNetwork) -> dict[str, Edge]:
@@ -103,9 +102,7 @@ def _onward(
     return {start: ways[start] for start, (a, b) in other.items() if a == b == None or ways.get(a or "") == b}  # noqa: E711
 
 
-def _chains(
-    edges: Mapping[str, Edge], onward: Mapping[str, str], opposite: Mapping[str, str]
-) -> Iterator[list[str]]:
+def _chains(edges: Mapping[str, Edge], onward: Mapping[str, str], opposite: Mapping[str, str]) -> Iterator[list[str]]:
     """The edges of each street, in one of its directions."""
     before, seen = {end: start for start, end in onward.items()}, set[str]()
     for edge in sorted(edges, key=lambda id: (id.startswith("-"), id)):

@@ -73,7 +73,11 @@ def add_signals(road: ET.Element, signals: Iterable[Signal]) -> None:
     parent = ET.SubElement(road, "signals")
     for signal in signals:
         along, limit = signal.lanes[0] < 0, str(signal.limit)
-        kind = {**_LIGHT} if signal.limit is None else {**_SIGN, "name": f"Speed_{limit}", "subtype": limit, "value": limit}
+        kind = (
+            {**_LIGHT}
+            if signal.limit is None
+            else {**_SIGN, "name": f"Speed_{limit}", "subtype": limit, "value": limit}
+        )
         element = ET.SubElement(
             parent, "signal", kind, id=signal.id, s=f"{signal.s:.6f}", t=f"{signal.t:.6f}", zOffset="0",
             orientation="+" if along else "-", hOffset="0" if along else f"{math.pi:.6f}",
@@ -82,7 +86,7 @@ def add_signals(road: ET.Element, signals: Iterable[Signal]) -> None:
 
 
 def add_controllers(root: ET.Element, network: OpenDriveNetwork, signals: Iterable[Signal]) -> dict[int, list[str]]:
-    """Adds a controller for the lights of each approach, which are green together; returns their ids by the junction."""
+    """Adds a controller for the lights of each approach, which are green together; their ids by their junctions."""
     groups = defaultdict[tuple[str, str], list[Signal]](list)
     for signal in signals:
         if signal.posts:
