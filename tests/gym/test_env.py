@@ -11,7 +11,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import caldrive.gym
-from caldrive.agents.reinforcement.config import CARLA2017, N_COMMANDS, control_of
+from caldrive.agents.reinforcement.config import CARLA2017, N_COMMANDS
+from caldrive.agents.reinforcement.inputs import control_of
 from caldrive.datatypes import CameraConfig, Command, Control, Pose
 from caldrive.gym import DrivingEnv, EnvConfig
 from caldrive.results import InfractionKind

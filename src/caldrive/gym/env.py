@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium
 
-from caldrive.agents.reinforcement.config import control_of
+from caldrive.agents.reinforcement.inputs import control_of
 from caldrive.datatypes import MAX_CENTER_DISTANCE, Control, Observation, Truth
 from caldrive.driving.referee import Referee
 from caldrive.driving.rules import RULES

@@ -11,9 +11,9 @@ from gymnasium import spaces
 
 from caldrive.agents.cal import OraclePerception
 from caldrive.agents.reinforcement.agent import make_eye, policy_camera
-from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig, control_of
+from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder
-from caldrive.agents.reinforcement.inputs import Eye, PolicyInputs
+from caldrive.agents.reinforcement.inputs import Eye, PolicyInputs, control_of
 from caldrive.agents.rows import model_path
 from caldrive.datatypes import CameraConfig
 from caldrive.driving.rules import COLLISION

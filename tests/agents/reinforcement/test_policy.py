@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig, control_of
+from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig
+from caldrive.agents.reinforcement.inputs import control_of
 from caldrive.agents.reinforcement.policy import Betas, Choices, Policy
 
 PAPER = PolicyConfig("frames", "carla2017", repeat=1, memory=False, hidden=512)

@@ -41,7 +41,8 @@ SERVED: dict[str, list[Any]] = {
     "set_traffic_light_state": ["light", 2], "set_traffic_light_green_time": ["light", 3.0],
     "set_traffic_light_yellow_time": ["light", 3.0], "set_traffic_light_red_time": ["light", 3.0],
     "freeze_traffic_light": ["light", False], "reset_traffic_light_group": ["light"], "reset_all_traffic_lights": [],
-    "freeze_all_traffic_lights": [False], "get_group_traffic_lights": ["light"], "get_light_boxes": ["light"],
+    "freeze_all_traffic_lights": [False], "restore_physx_physics": ["car"],
+    "get_group_traffic_lights": ["light"], "get_light_boxes": ["light"],
     "apply_batch": [[[[1, [10**9]]]], False], "is_traffic_manager_running": [8000],
     "get_traffic_manager_running": [8000], "add_traffic_manager_running": [["127.0.0.1", 8000]],
     "destroy_traffic_manager": [8000], "get_all_level_BBs": [3], "get_environment_objects": [255],
@@ -64,7 +65,7 @@ REFUSED: dict[str, list[Any]] = {
     "get_gbuffer_token": ["car", 1], "get_actor_component_world_transform": ["car", "x"],
     "get_actor_component_relative_transform": ["car", "x"], "copy_opendrive_to_file": ["<x/>", []],
     "request_file": ["no"], "enable_carsim": ["car", "x"], "use_carsim_road": ["car", True],
-    "enable_chrono_physics": ["car", 1, 0.1, "", "", "", ""], "restore_physx_physics": ["car"],
+    "enable_chrono_physics": ["car", 1, 0.1, "", "", "", ""],
     "load_new_episode": ["Town99", True, 0],
 }  # fmt: skip
 

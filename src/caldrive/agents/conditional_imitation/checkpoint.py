@@ -69,7 +69,7 @@ def save_imitation(path: Path, network: ImitationNetwork, info: ImitationInfo) -
 
 def read_imitation_info(path: Path) -> ImitationInfo:
     """What is known of a network; its weights are not read. Raises CheckpointError where it is none of this kind."""
-    return read_known(path, KIND, ImitationInfo)[0]
+    return read_known(path, KIND, ImitationInfo)
 
 
 def load_imitation(path: Path) -> tuple[ImitationNetwork, ImitationInfo]:

@@ -41,7 +41,7 @@ def save_segmentation(path: Path, network: SegmentationNetwork, info: Segmentati
 
 def read_segmentation_info(path: Path) -> SegmentationInfo:
     """What is known of a network; its weights are not read. Raises CheckpointError where it is none of this kind."""
-    return read_known(path, KIND, SegmentationInfo)[0]
+    return read_known(path, KIND, SegmentationInfo)
 
 
 def load_segmentation(path: Path) -> tuple[SegmentationNetwork, SegmentationInfo]:

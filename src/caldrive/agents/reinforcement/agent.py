@@ -8,9 +8,9 @@ from pathlib import Path
 import torch
 
 from caldrive.agents.reinforcement.checkpoint import load_policy
-from caldrive.agents.reinforcement.config import FRAME, PolicyConfig, control_of
+from caldrive.agents.reinforcement.config import FRAME, PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder, encode_function
-from caldrive.agents.reinforcement.inputs import AffordanceEye, Eye, FeatureEye, FrameEye, PolicyInputs
+from caldrive.agents.reinforcement.inputs import AffordanceEye, Eye, FeatureEye, FrameEye, PolicyInputs, control_of
 from caldrive.agents.reinforcement.policy import Policy
 from caldrive.datatypes import CameraConfig, Control, Decision, Observation
 from caldrive.interfaces import BadImage, Perception

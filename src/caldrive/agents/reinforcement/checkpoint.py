@@ -66,7 +66,7 @@ def encoder_info(encoder: Encoder) -> EncoderInfo:
 
 def read_policy_info(path: Path) -> PolicyInfo:
     """What is known of a policy; its weights are not read. Raises CheckpointError where the file is none."""
-    return read_known(path, KIND, PolicyInfo)[0]
+    return read_known(path, KIND, PolicyInfo)
 
 
 def load_policy(path: Path) -> tuple[Policy, PolicyInfo, Encoder | None]:

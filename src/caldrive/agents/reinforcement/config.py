@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
-
-import numpy as np
-
-from caldrive.datatypes import Control
+from typing import Literal
 
 Sees = Literal["frames", "features", "affordances"]
 Action = Literal["continuous", "carla2017"]
@@ -49,17 +45,3 @@ class PolicyConfig:
     def n_outputs(self) -> int:
         """Parameters of its distribution."""
         return len(CARLA2017) if self.action == "carla2017" else 2 * N_CONTINUOUS
-
-
-def control_of(kind: Action, action: Any) -> Control:
-    """An action as a control, the same in training and at the wheel: the number of one of CARLA2017, or throttle and
-    steering, of which what lies outside [-1, 1] is cut."""
-    if kind == "carla2017":
-        throttle, right = CARLA2017[int(action)]
-        return _control(throttle, -right)
-    throttle, steer = np.clip(np.asarray(action, dtype=float), -1.0, 1.0).tolist()
-    return _control(throttle, steer)
-
-
-def _control(throttle: float, steer: float) -> Control:
-    return Control(throttle=max(throttle, 0.0), brake=max(-throttle, 0.0), steer=steer)

@@ -1,5 +1,5 @@
-"""What a policy is given of what an agent may see: image, speed and command. The same code in training and at the
-wheel."""
+"""What a policy is given of what an agent may see (image, speed and command), and its actions as the car takes them.
+The same code in training and at the wheel."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.agents.reinforcement.config import FRAME, SIGNS
+from caldrive.agents.reinforcement.config import CARLA2017, FRAME, SIGNS, Action
 from caldrive.compiled import Floats
 from caldrive.datatypes import (
     MAX_CENTER_DISTANCE,
@@ -145,3 +145,17 @@ def affordance_vector(affordances: Affordances) -> NDArray[np.float32]:
         *(float(affordances.speed_sign == sign) for sign in SIGNS),
     )  # fmt: skip
     return np.clip(np.array(numbers, np.float32), -1.0, 1.0)
+
+
+def control_of(kind: Action, action: Any) -> Control:
+    """An action as a control: the number of one of CARLA2017, or throttle and steering, of which what lies outside
+    [-1, 1] is cut."""
+    if kind == "carla2017":
+        throttle, right = CARLA2017[int(action)]
+        return _control(throttle, -right)
+    throttle, steer = np.clip(np.asarray(action, dtype=float), -1.0, 1.0).tolist()
+    return _control(throttle, steer)
+
+
+def _control(throttle: float, steer: float) -> Control:
+    return Control(throttle=max(throttle, 0.0), brake=max(-throttle, 0.0), steer=steer)

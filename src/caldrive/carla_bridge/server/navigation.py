@@ -28,7 +28,7 @@ NO_LINK, NOBODY = 0xFFFFFFFF, 0
 POLYGON = struct.Struct("<I6H6HHBB")
 LINKS, LINK_SIZE = 4, 12  # of each quadrilateral, and bytes of one
 DETAIL = struct.pack("<IIBB2x", 0, 0, 0, 2)  # two triangles without corners of their own
-TRIANGLES = bytes((0, 1, 2, 0, 0, 2, 3, 0))
+TRIANGLES = bytes((0, 1, 2, 0b000101, 0, 2, 3, 0b010100))  # corners, and which edges are the quadrilateral's own
 
 
 @lru_cache(maxsize=2)

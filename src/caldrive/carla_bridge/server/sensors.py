@@ -24,7 +24,7 @@ from caldrive.world.rendering.pinhole import PinholeCamera
 from caldrive.world.town import Town
 from caldrive.world.traffic.collisions import obstacle_of
 
-EARTH = 6_378_137.0  # m, the radius by which CARLA's client turns places into latitudes
+EARTH = 0.9996 * 6_378_137.0  # m, the radius by which CARLA's client turns places into degrees (it scales by UTM's)
 GRAVITY = 9.81  # m/s²
 FARTHEST = 1000.0  # m that a depth image reaches
 DEPTH_STEPS = 256**3 - 1

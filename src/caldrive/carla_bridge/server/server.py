@@ -29,7 +29,7 @@ from caldrive.carla_bridge.server.wire import Request, refused
 from caldrive.world.town import Town, load_town
 
 FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
-GRACE = 0.5  # s after a call until the clock begins to move the world: time to ask for synchronous mode
+GRACE = 1.0  # s after a call until the clock begins to move the world: time to ask for synchronous mode
 LONGEST_GRACE = 5.0  # s after the first call
 LONGEST_STEP = 1.0  # s
 

@@ -149,22 +149,24 @@ def save_network(path: Path | str, network: Network, info: CheckpointInfo, half:
 def read_info(path: Path | str) -> CheckpointInfo:
     """What is known of a network; its weights are not read. Raises CheckpointError where it is none of this code's
     kind."""
-    info, header = read_known(Path(path), "network", CheckpointInfo)
+    path = Path(path)
+    header = read_header(path)
+    require_kind(path, header, "network")
     if header.get("specs") != describe():
         raise CheckpointError(
             f"found in {path} a network for other affordances, wanted those of this caldrive: train the network again"
         )
-    return info
+    return read_known(path, "network", CheckpointInfo)
 
 
-def read_known(path: Path, kind: str, info: type[Info]) -> tuple[Info, dict[str, Any]]:
-    """What a header says of a network of some kind (a key of `AGENTS`), as a dataclass, and the whole header. Raises
-    CheckpointError where the file is of another kind, or its header none of a training's."""
+def read_known(path: Path, kind: str, info: type[Info]) -> Info:
+    """What a header says of a network of some kind (a key of `AGENTS`), as a dataclass. Raises CheckpointError where
+    the file is of another kind, or its header none of a training's."""
     header = read_header(path)
     require_kind(path, header, kind)
     names = {part.name for part in fields(info)}  # type: ignore[arg-type]
     try:
-        return as_type({name: header[name] for name in header.keys() & names}, info), header
+        return as_type({name: header[name] for name in header.keys() & names}, info)
     except (KeyError, TypeError, ValueError) as error:
         raise CheckpointError(
             f"found in {path} a header that cannot be read ({error}), wanted a training's: train the network again"

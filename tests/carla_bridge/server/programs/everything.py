@@ -36,6 +36,7 @@ def main() -> None:
         world.tick()
     assert abs(walker.get_location().distance(before) - 1.5) < 0.1
     refuse(world, car)
+    imu.sensor.destroy()
     assert walker.destroy()
     assert car.destroy()
     world.tick()
