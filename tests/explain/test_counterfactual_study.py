@@ -21,6 +21,7 @@ from caldrive.explain.counterfactuals import Studio, see
 from caldrive.explain.gradcam import Question
 from caldrive.explain.interventions import INTERVENTIONS
 from caldrive.perception.inference.predictor import NetworkPerception
+from caldrive.perception.network.checkpoint import write_tensors
 from caldrive.perception.network.network import Network
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import CameraRig
@@ -54,7 +55,7 @@ def test_pictures_are_those_that_the_world_would_have_shown(network: Network, no
 
 
 def test_a_study_of_a_short_drive_gives_the_same_twice(network: Network, no_sumo_left: None) -> None:
-    scenarios = chosen_scenarios(EpisodeSettings(task="navigation-dynamic", people=150, cars=5, seconds=8.0), 1)
+    scenarios = chosen_scenarios(EpisodeSettings(task="navigation-dynamic", people=60, cars=3, seconds=5.0), 1)
 
     def once() -> tuple[Study, bytes]:
         found = study(network, NetworkPerception(network, watchdog=False), scenarios, cases=1, layer="coarse", seed=3)
@@ -73,7 +74,20 @@ def test_a_study_of_a_short_drive_gives_the_same_twice(network: Network, no_sumo
 def test_the_command_answers_with_effects_and_verdicts(tmp_path: Path, no_sumo_left: None) -> None:
     out = tmp_path / "sheet.png"
     answer = run_json(
-        "explain", "counterfactuals", "--episodes", "1", "--seconds", "3", "--cases", "1", "--out", str(out)
+        "explain",
+        "counterfactuals",
+        "--episodes",
+        "1",
+        "--seconds",
+        "1.5",
+        "--cars",
+        "0",
+        "--people",
+        "5",
+        "--cases",
+        "1",
+        "--out",
+        str(out),
     )
     assert out.is_file()
     assert {"found", "effects", "observations", "at_the_wheel"} < answer.keys()
@@ -94,3 +108,10 @@ def test_the_command_answers_with_effects_and_verdicts(tmp_path: Path, no_sumo_l
 )
 def test_what_cannot_be_studied_ends_in_a_sentence(options: tuple[str, ...], sentence: str) -> None:
     assert sentence in run_json("explain", "counterfactuals", *options, code=2)["error"]
+
+
+def test_the_weights_of_another_agent_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mp.safetensors"
+    write_tensors(path, {"weight": torch.zeros(1)}, {"kind": "mp"})
+    refused = run_json("explain", "counterfactuals", "--model", str(path), code=2)
+    assert "weights of the agent mp, wanted those of cal" in refused["error"]

@@ -47,9 +47,7 @@ VERBS: Mapping[str, Verb] = {
     "explain drive": Verb(ExplainDrive, "Film where the network looks in a drive."),
     "explain pictures": Verb(ExplainPictures, "Film where it looks in your own video or pictures."),
     "explain recording": Verb(ExplainRecording, "Draw where it looks in recorded frames, and measure it."),
-    "explain counterfactuals": Verb(
-        ExplainCounterfactuals, "Change one thing in a picture, and see what it says then."
-    ),
+    "explain counterfactuals": Verb(ExplainCounterfactuals, "Change one thing in its pictures, and ask it again."),
     "collect": Verb(Collect, "Record what the oracle drives, for training."),
     "data": Verb(Data, "Check and describe a recording."),
     "convert": Verb(Convert, "Write a recording in a format that others' code reads."),
