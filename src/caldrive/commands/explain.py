@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 from tyro.conf import UseAppendAction
@@ -12,7 +12,9 @@ from tyro.conf import UseAppendAction
 from caldrive.commands.answer import Answer, Configurable, Output
 from caldrive.driving.settings import EpisodeSettings, SeeSettings
 from caldrive.progress import Progress
-from caldrive.scenarios import Scenario
+
+if TYPE_CHECKING:  # it loads numpy, for which --help does not wait
+    from caldrive.scenarios import Scenario
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import pytest
 from caldrive.carla_bridge.server.serve import make_server
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
-from tests.carla_bridge.server.wire_client import RefusedError, WireClient
+from tests.carla_bridge.server.wire_client import RefusedError, WireClient, free_port
 
 V, T = [1.0, 2.0, 3.0], [[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]
 SERVED: dict[str, list[Any]] = {
@@ -72,7 +72,7 @@ REFUSED: dict[str, list[Any]] = {
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    made = make_server(ServerSettings(town="town01", port=24620))
+    made = make_server(ServerSettings(town="town01", port=free_port()))
     yield made
     made.close()
 

@@ -14,7 +14,9 @@ from typing import Any
 
 import pytest
 
-PORT, MANAGER = 24640, 24650
+from tests.carla_bridge.server.wire_client import free_port
+
+PORT, MANAGER = free_port(), free_port()
 ROOT = Path(__file__).parents[3]
 PATIENCE = 900.0  # s
 pytestmark = pytest.mark.skipif(find_spec("carla") is None, reason="needs the wheel of CARLA's client")

@@ -12,9 +12,9 @@ import pytest
 from caldrive.carla_bridge.server.serve import make_server
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
-from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, positions
+from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, free_port, positions
 
-PORT = 24610
+PORT = free_port()
 SETTINGS = ServerSettings(town="town01", port=PORT)
 WORLD = 1
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import socket
 import struct
 import time
+from contextlib import suppress
 from typing import Any
 
 import msgpack
@@ -115,3 +116,13 @@ def positions(snapshot: bytes) -> dict[int, tuple[float, float]]:
     assert len(rows) % 119 == 0
     found = (struct.unpack_from("<IB2f", rows, k) for k in range(0, len(rows), 119))
     return {id: (x, y) for id, _, x, y in found}
+
+
+def free_port() -> int:
+    """The first of three ports in a row that nobody has: each process of a test run serves by its own."""
+    while True:
+        with socket.create_server(("127.0.0.1", 0)) as first, suppress(OSError, OverflowError):
+            port: int = first.getsockname()[1]
+            for k in (1, 2):
+                socket.create_server(("127.0.0.1", port + k)).close()
+            return port
