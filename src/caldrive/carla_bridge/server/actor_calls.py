@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from caldrive.carla_bridge.axes import Placement, compose
@@ -147,8 +148,6 @@ class ActorCalls:
     @call("set_actor_target_velocity")
     def set_velocity(self, caller: int, number: int, velocity: Vector) -> None:
         """A vehicle has that speed along its heading at once."""
-        from dataclasses import replace
-
         vehicle = self.find(number, Vehicle)
         heading, (x, y) = vehicle.state.pose.heading, plane(velocity, FASTEST)
         vehicle.state = replace(vehicle.state, speed=x * math.cos(heading) + y * math.sin(heading))

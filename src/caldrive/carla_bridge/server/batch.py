@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_type_hints
 
 import msgspec
 
@@ -91,8 +91,6 @@ class Batches:
 
 def _arguments(method: Callable[..., Any]) -> Any:
     """What a call takes, as a tuple's type."""
-    from typing import get_type_hints
-
     hints = get_type_hints(method)
     kinds = tuple(hint for name, hint in hints.items() if name not in ("caller", "return"))
     return tuple[kinds]  # type: ignore[valid-type]

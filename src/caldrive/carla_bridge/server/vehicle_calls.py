@@ -223,19 +223,19 @@ class VehicleCalls:
         at = self._light(number).place
         return [BoundingBox(Vector(at.x, -at.y, 3.0), Vector(0.2, 0.2, 0.5))]
 
-    def require_no_more(self) -> None:
-        """Raises Refusal for what only Unreal has."""
+    def _refuse_model(self) -> None:
+        """Raises Refusal: there is one model of a vehicle."""
         raise Refusal("found a vehicle model of CARLA's own, wanted the bicycle model that caldrive has: leave it out")
 
     @call("enable_carsim")
     def carsim(self, caller: int, number: int, file: str = "") -> None:
         """Not here."""
-        self.require_no_more()
+        self._refuse_model()
 
     @call("use_carsim_road")
     def carsim_road(self, caller: int, number: int, is_on: bool = False) -> None:
         """Not here."""
-        self.require_no_more()
+        self._refuse_model()
 
     @call("enable_chrono_physics")
     def chrono(
@@ -243,7 +243,7 @@ class VehicleCalls:
         tire: str = "", base: str = "",
     ) -> None:  # fmt: skip
         """Not here."""
-        self.require_no_more()
+        self._refuse_model()
 
     @call("restore_physx_physics")
     def physx(self, caller: int, number: int) -> None:

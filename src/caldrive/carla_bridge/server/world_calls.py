@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import shapely
+
 from caldrive.carla_bridge.server.actors import LABELS
 from caldrive.carla_bridge.server.calls import Call, call
 from caldrive.carla_bridge.server.episode import NATIVE_HEIGHT
@@ -89,8 +91,6 @@ class WorldCalls:
         return [point] if meets else []
 
     def _ground(self, x: float, y: float) -> int:
-        import shapely
-
         return 1 if shapely.contains_xy(self._server.episode.town.roads.roadway, x, -y) else 2
 
 

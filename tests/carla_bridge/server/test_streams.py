@@ -1,0 +1,83 @@
+"""Streams and those who read them too slowly, or not at all."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from caldrive.carla_bridge.server import streams as module
+from caldrive.carla_bridge.server.outbox import listening
+from caldrive.carla_bridge.server.streams import Streams
+
+STREAM, PORT = 5, 24660
+MEGABYTE = bytes(1_000_000)
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def streams(said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Streams]:
+    monkeypatch.setattr(module, "MOST_WAITING", 20_000_000)
+    monkeypatch.setattr(module, "PATIENCE", 0.2)
+    made = Streams(listening("127.0.0.1", PORT), said.append, newcomer=lambda stream: [b"first"])
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def reader(streams: Streams) -> Iterator[socket.socket]:
+    with socket.create_connection(("127.0.0.1", PORT)) as made:
+        streams.announce(STREAM)
+        made.send(struct.pack("<I", STREAM))
+        streams.settle()
+        yield made
+
+
+def test_a_subscriber_hears_the_latest_at_once(reader: socket.socket) -> None:
+    assert reader.recv(100) == struct.pack("<I", 5) + b"first"
+
+
+def test_a_token_says_where_a_stream_is(streams: Streams) -> None:
+    assert struct.unpack("<IHBB16x", streams.token(STREAM)) == (STREAM, PORT, 1, 0)
+
+
+def test_whoever_is_announced_and_does_not_come_is_waited_for_only_a_moment(streams: Streams) -> None:
+    streams.announce(STREAM)
+    begin = time.monotonic()
+    streams.settle()
+    streams.settle()
+    assert 0.15 < time.monotonic() - begin < 5.0
+    assert not streams.is_wanted(STREAM)
+
+
+def test_who_does_not_read_misses_messages_and_is_cut_off(
+    streams: Streams, reader: socket.socket, said: list[str]
+) -> None:
+    for _ in range(40):
+        streams.send(STREAM, [MEGABYTE])  # does not wait
+    assert [line for line in said if "misses messages" in line]
+    streams.settle()
+    assert not streams.is_wanted(STREAM)
+    assert "cut off" in said[-1]
+
+
+def test_who_reads_slowly_is_waited_for(streams: Streams, reader: socket.socket, said: list[str]) -> None:
+    for _ in range(15):
+        streams.send(STREAM, [MEGABYTE])
+    reader.setblocking(False)
+    received = 0
+    while received < 15_000_000:
+        try:
+            received += len(reader.recv(2**20))
+        except BlockingIOError:
+            streams.poll()
+    streams.settle()
+    assert streams.is_wanted(STREAM)
+    assert said == []
