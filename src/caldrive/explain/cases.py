@@ -30,7 +30,7 @@ from caldrive.world.town import Town
 from caldrive.world.truth.labels import A1, A2, A3, faces, light_area
 
 CAMERA = CameraConfig()
-NEAREST, FARTHEST = 4.0, 30.0  # m ahead at which a thing is looked for that is of no concern
+NEAREST, FARTHEST = 4.0, 60.0  # m ahead at which a thing is looked for that is of no concern
 APART = 8.0  # m between two lights of which one is of no concern: nearer, they may share a post
 BODY = 0.6  # m beside the picture's edge from which on nothing of a person's body is in it
 SHADOW_REACH = 12.0  # m

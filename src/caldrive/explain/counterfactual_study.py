@@ -36,13 +36,15 @@ from caldrive.interfaces import Perception
 from caldrive.perception.network.network import Network
 from caldrive.progress import Progress, silent
 from caldrive.scenarios import Scenario
-from caldrive.visualization.gauges import BACKGROUND, write
+from caldrive.visualization.gauges import BACKGROUND, MUTED, write
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import CameraRig
 from caldrive.world.town import load_town
 
 CROSSING = 4.0  # times as often as usual people cross the road: else a hazard by a person is rare
 CAPTION, GAP = 22, 4  # pixels
+HEADS = ("as it was", "with the change", "difference, three times as strong", "attention, as it was")
+STRONGER = 3  # times as strong a difference is drawn, as a shadow is faint
 Shown = Mapping[Intervention, tuple[Seen, Counterfactual]]
 
 
@@ -151,19 +153,22 @@ def sheet(shown: Shown, width: int = 300) -> bytes:
     """A PNG: a row for each change, with a moment as it was, as it is with the change, the difference, and where the
     network looked. width: pixels of a picture."""
     rows = [_row(intervention, *shown[intervention], width) for intervention in INTERVENTIONS if intervention in shown]
-    page = Picture.fromarray(np.concatenate(rows) if rows else np.full((CAPTION, width, 3), BACKGROUND, np.uint8))
+    head = Picture.new("RGB", (len(HEADS) * (width + GAP), CAPTION), BACKGROUND)
+    for k, text in enumerate(HEADS):
+        write(ImageDraw.Draw(head), (k * (width + GAP) + 6, CAPTION / 2), text, 13, MUTED)
     content = io.BytesIO()
-    page.save(content, "PNG", optimize=True)
+    Picture.fromarray(np.concatenate([np.asarray(head), *rows])).save(content, "PNG", optimize=True)
     return content.getvalue()
 
 
 def _row(intervention: Intervention, seen: Seen, changed: Counterfactual, width: int) -> Image:
     before, attention = seen.images[-1], seen.attention
-    difference = np.abs(before.astype(int) - changed.image).max(axis=2, keepdims=True).astype(np.uint8)
+    difference = np.abs(before.astype(int) - changed.image).max(axis=2, keepdims=True) * STRONGER
     looked = overlay(before, attention.now, scale_of([attention.now]), attention.reply.probability)
-    pictures = [before, changed.image, np.broadcast_to(difference, before.shape), looked]
+    gray = np.broadcast_to(difference.clip(max=255).astype(np.uint8), before.shape)
+    pictures = [before, changed.image, gray, looked]
     height = round(before.shape[0] * width / before.shape[1])
-    page = Picture.new("RGB", (4 * (width + GAP), height + CAPTION), BACKGROUND)
+    page = Picture.new("RGB", (len(pictures) * (width + GAP), height + CAPTION), BACKGROUND)
     for k, picture in enumerate(pictures):
         page.paste(Picture.fromarray(picture).resize((width, height)), (k * (width + GAP), CAPTION))
     kind = " (control)" if intervention.control else ""

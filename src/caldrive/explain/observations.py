@@ -31,6 +31,7 @@ from caldrive.explain.interventions import (
 OUTLINE = 2  # pixels to either side of the road's end
 LOWER = 1 / 3  # of a person's height
 FEWEST_EPISODES = 5  # of which an interval says anything
+LEAST = 0.01  # of a probability, or of the attention: what is less is no effect, however sure
 Changed = dict[str, Counterfactual]  # by the name of the change
 Measure = Callable[[Seen, Changed], float | None]  # positive where a statement holds, None where it cannot be asked
 
@@ -143,11 +144,11 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """True or not, by the interval alone."""
+        """Whether it is true, by the interval alone: which has to lie beyond LEAST, or below it."""
         if self.interval is None or self.episodes < FEWEST_EPISODES:
             return "too few cases"
         low, high = self.interval
-        return "true" if low > 0 else "false" if high < 0 else "not shown"
+        return "true" if low > LEAST else "false" if high < LEAST else "not shown"
 
 
 def measured(seen: Seen, found: Sequence[Counterfactual]) -> Iterator[tuple[Statement, float]]:
