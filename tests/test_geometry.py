@@ -12,6 +12,7 @@ from caldrive.geometry import (
     Polyline,
     box_corners,
     boxes_overlap,
+    mitres,
     moved,
     polygon_distance,
     to_local,
@@ -114,3 +115,11 @@ def test_polyline_keeps_to_the_window() -> None:
 def test_polyline_says_what_it_needs(points: np.ndarray) -> None:
     with pytest.raises(ValueError, match="a polyline needs"):
         Polyline(points)
+
+
+def test_a_line_moved_along_its_mitres_is_as_far_away_everywhere() -> None:
+    points = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 20.0)])
+    beside = points + 2.0 * mitres(points)
+    assert beside[1].tolist() == pytest.approx([8.0, 2.0])
+    line = Polyline(points)
+    assert [line.project(*middle).left for middle in (beside[1:] + beside[:-1]) / 2] == pytest.approx([2.0, 2.0, 2.0])

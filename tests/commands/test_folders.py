@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -33,7 +32,7 @@ def test_a_folder_where_another_process_is_at_work_is_left_alone(
 
 
 def test_two_reports_do_not_mix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = SimpleNamespace(name="one", results=(), folder=tmp_path, explanations={}, failures=[])
+    run = runs.BenchmarkRun("one", tmp_path, {}, ())
     monkeypatch.setattr(runs, "load_runs", lambda folders: [run])
     monkeypatch.setattr(runs, "failures", lambda of: [])
     monkeypatch.setattr(page, "report_text", lambda of: "text")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from caldrive.datatypes import Points, Pose
 from caldrive.geometry import BLEND, Polyline, mitres, moved, to_local, wrap_angle
 
-MOST_OFF = 0.04  # m
+MOST_OFF = 0.035  # m
 STRAIGHT = 1e-4  # rad
 _NODES, _WEIGHTS = (values / 2 for values in np.polynomial.legendre.leggauss(8))
 

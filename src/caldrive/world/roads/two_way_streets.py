@@ -98,8 +98,12 @@ def _onward(
         return is_only_way and is_no_junction and lanes_stay and lit.isdisjoint(id for id, _ in alike)
 
     ways = {start: out[0].end.edge for start, out in leaving.items() if goes_on(start, out[0].end.edge)}
-    other = {start: (opposite.get(end), opposite.get(start)) for start, end in ways.items()}
-    return {start: ways[start] for start, (a, b) in other.items() if a == b == None or ways.get(a or "") == b}  # noqa: E711
+
+    def comes_back(start: str, end: str) -> bool:
+        there, here = opposite.get(end), opposite.get(start)
+        return here is None if there is None else here is not None and ways.get(there) == here
+
+    return {start: end for start, end in ways.items() if comes_back(start, end)}
 
 
 def _chains(edges: Mapping[str, Edge], onward: Mapping[str, str], opposite: Mapping[str, str]) -> Iterator[list[str]]:
