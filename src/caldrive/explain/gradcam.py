@@ -105,7 +105,7 @@ def ask(network: Network, question: Question, images: Sequence[Image]) -> Reply:
 def attend(network: Network, question: Question, images: Sequence[Image], layer: str = "coarse") -> Attention:
     """Where a network looks, in images as for `ask`. Raises ValueError for an unknown layer, RuntimeError without
     Captum."""
-    captum = _require_captum()
+    captum = require_captum()
     if layer not in LAYERS:
         raise ValueError(f"found layer {layer!r}, wanted one of {', '.join(LAYERS)}: type --layer coarse")
     batch = _batch(network, question, images)
@@ -130,7 +130,8 @@ def upsampled(one: Map, size: tuple[int, int]) -> Map:
     return result
 
 
-def _require_captum() -> Any:
+def require_captum() -> Any:
+    """Captum's methods. Raises RuntimeError without Captum."""
     try:
         import captum.attr
     except ImportError as error:
