@@ -167,12 +167,14 @@ class ExplainCounterfactuals(Output):
         from caldrive.checks import require_within, require_writable_file
         from caldrive.commands.explain_tables import study_table
         from caldrive.explain.counterfactual_study import sheet, study
+        from caldrive.explain.gradcam import require_captum
         from caldrive.files import write_whole
         from caldrive.perception.inference.predictor import NetworkPerception
         from caldrive.perception.network.checkpoint import load_network
 
         require_writable_file(self.out, "--out", ".png")
         require_within("--cases", self.cases, 1, 1000, 40)
+        require_captum()  # before the drive, not after it
         path = model_path(self.model)
         network, _ = load_network(path)
         scenarios = self.scenarios()
