@@ -16,7 +16,7 @@ from caldrive.benchmark.suites import suite, to_json
 from caldrive.cli import main, parse
 from caldrive.commands import VERBS, verb_words
 from caldrive.commands.answer import Configurable
-from caldrive.perception.network.checkpoint import UNFINISHED
+from caldrive.perception.network.tensor_file import UNFINISHED
 from caldrive.visualization import contact_sheet
 from caldrive.visualization.episode_video import VideoWriter
 from scripts.kept_reports import SUITES, report_again

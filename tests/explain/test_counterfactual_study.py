@@ -21,8 +21,8 @@ from caldrive.explain.counterfactuals import Studio, see
 from caldrive.explain.gradcam import Question
 from caldrive.explain.interventions import INTERVENTIONS
 from caldrive.perception.inference.predictor import NetworkPerception
-from caldrive.perception.network.checkpoint import write_tensors
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import write_tensors
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import CameraRig
 from tests.command_line import run_json

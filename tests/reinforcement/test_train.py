@@ -20,7 +20,7 @@ from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
 from caldrive.agents.reinforcement.checkpoint import load_policy
 from caldrive.agents.reinforcement.encoder import Encoder
 from caldrive.files import locked_folder
-from caldrive.perception.network.checkpoint import UNFINISHED, CheckpointError, read_header, write_tensors
+from caldrive.perception.network.tensor_file import UNFINISHED, CheckpointError, read_header, write_tensors
 from caldrive.reinforcement.config import REINFORCEMENTS, ReinforcementConfig
 from caldrive.reinforcement.train import draw_curves, train_rl
 from tests.reinforcement.data import SHORT, straight_road

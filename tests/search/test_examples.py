@@ -11,9 +11,10 @@ import torch
 
 from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Pose
-from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_tensors, write_tensors
+from caldrive.perception.network.checkpoint import load_network
 from caldrive.perception.network.config import BlockConfig
 from caldrive.perception.network.network import TaskBlock
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors, write_tensors
 from caldrive.progress import silent
 from caldrive.recordings.writer import EpisodeError
 from caldrive.scenarios import Scenario

@@ -1,12 +1,16 @@
-"""The verb that serves the embedded world to CARLA's client."""
+"""The verb that serves the embedded world to CARLA's client, and the server with all its calls."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.commands.answer import Answer, Output
 from caldrive.progress import Progress
+
+if TYPE_CHECKING:  # it needs msgpack, which may be missing
+    from caldrive.carla_bridge.server.server import Server
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,14 +19,6 @@ class ServeCarla(ServerSettings, Output):
 
     def run(self, progress: Progress) -> Answer:
         """Serves; answers when it is stopped."""
-        try:
-            from caldrive.carla_bridge.server.serve import make_server
-        except ModuleNotFoundError as error:
-            if error.name != "msgpack":
-                raise
-            raise RuntimeError(
-                "found no msgpack, wanted it to speak with CARLA's client: type pip install 'caldrive[serve]'"
-            ) from error
         progress(f"loading {self.town}", 0.0)
         server = make_server(self)
         try:
@@ -34,3 +30,30 @@ class ServeCarla(ServerSettings, Output):
         finally:
             server.close()
         return Answer({"port": self.port}, "served")
+
+
+def make_server(settings: ServerSettings) -> Server:
+    """A server that waits for clients. Raises OSError where a port is taken, ValueError for a town that cannot be,
+    RuntimeError without msgpack."""
+    try:
+        from caldrive.carla_bridge.server.actor_calls import ActorCalls
+    except ModuleNotFoundError as error:
+        if error.name != "msgpack":
+            raise
+        raise RuntimeError(
+            "found no msgpack, wanted it to speak with CARLA's client: type pip install 'caldrive[serve]'"
+        ) from error
+    from caldrive.carla_bridge.server.batch import Batches
+    from caldrive.carla_bridge.server.calls import calls_of
+    from caldrive.carla_bridge.server.server import Server
+    from caldrive.carla_bridge.server.session_calls import SessionCalls
+    from caldrive.carla_bridge.server.vehicle_calls import VehicleCalls
+    from caldrive.carla_bridge.server.world_calls import WorldCalls, other_calls
+
+    server = Server(settings)
+    actors = ActorCalls(server)
+    vehicles = VehicleCalls(server, actors)
+    server.calls = other_calls()
+    for table in (SessionCalls(server), actors, vehicles, Batches(server, actors, vehicles), WorldCalls(server)):
+        server.calls |= calls_of(table)
+    return server

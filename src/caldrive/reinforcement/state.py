@@ -12,7 +12,7 @@ from torch import Tensor
 
 from caldrive.agents.rows import model_path
 from caldrive.files import as_type, read_json
-from caldrive.perception.network.checkpoint import CheckpointError, read_tensors, write_tensors
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.training.resume import restore_run, run_tensors
 from caldrive.provenance import file_digest
 from caldrive.reinforcement.config import ReinforcementConfig

@@ -20,8 +20,9 @@ from torch import Tensor
 from caldrive.affordances import BY_NAME
 from caldrive.perception.dataset.frames import Frames, Ids
 from caldrive.perception.inference.precision import driving_precision
-from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_header, read_info, write_tensors
+from caldrive.perception.network.checkpoint import load_network, read_info
 from caldrive.perception.network.config import BlockConfig
+from caldrive.perception.network.tensor_file import CheckpointError, read_header, write_tensors
 from caldrive.perception.training.history_stage import feature_table
 from caldrive.progress import Progress
 from caldrive.provenance import file_digest

@@ -19,17 +19,10 @@ from caldrive.perception.dataset.sampler import data_summary
 from caldrive.perception.evaluation.evaluate import metrics
 from caldrive.perception.network.calibration import calibrated
 from caldrive.perception.network.camera_check import add_camera_check, load_camera_check
-from caldrive.perception.network.checkpoint import (
-    UNFINISHED,
-    CheckpointError,
-    CheckpointInfo,
-    load_network,
-    read_info,
-    round_to_half,
-    save_network,
-)
+from caldrive.perception.network.checkpoint import CheckpointInfo, load_network, read_info, save_network
 from caldrive.perception.network.config import BlockConfig
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import UNFINISHED, CheckpointError, round_to_half
 from caldrive.perception.training.loop import finite
 from caldrive.progress import Progress
 from caldrive.search.best import FIRST_SEED

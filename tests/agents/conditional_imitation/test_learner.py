@@ -14,7 +14,7 @@ from caldrive.agents.conditional_imitation.checkpoint import load_imitation
 from caldrive.agents.conditional_imitation.config import ImitationWeights
 from caldrive.agents.conditional_imitation.learner import imitation_loss, train_imitation
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
-from caldrive.perception.network.checkpoint import CheckpointError
+from caldrive.perception.network.tensor_file import CheckpointError
 from caldrive.perception.training import folder as folder_of_training
 from tests.agents.conditional_imitation.data import SHORT, SMALL
 from tests.perception.data import record

@@ -19,7 +19,7 @@ from caldrive.agents.conditional_imitation.config import IMITATION_NETWORKS, Imi
 from caldrive.agents.conditional_imitation.network import ImitationNetwork
 from caldrive.agents.rows import SHIPPED_MODEL
 from caldrive.perception.dataset.config import RecolourConfig
-from caldrive.perception.network.checkpoint import CheckpointError
+from caldrive.perception.network.tensor_file import CheckpointError
 from tests.agents.conditional_imitation.data import SMALL
 
 INFO = ImitationInfo(SMALL, {"train_frames": 3}, {"loss": 0.5}, {"steps": 1})

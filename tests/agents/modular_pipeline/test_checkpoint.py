@@ -16,7 +16,8 @@ from caldrive.agents.modular_pipeline.checkpoint import (
 )
 from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
 from caldrive.agents.rows import SHIPPED_MODEL
-from caldrive.perception.network.checkpoint import CheckpointError, load_network, round_to_half
+from caldrive.perception.network.checkpoint import load_network
+from caldrive.perception.network.tensor_file import CheckpointError, round_to_half
 from tests.agents.modular_pipeline.test_segmenter import SMALL
 
 INFO = SegmentationInfo(SMALL, {"train_frames": 3}, {"iou/road": 0.5}, {"steps": 7}, (1.0,) * 13)

@@ -27,7 +27,7 @@ from caldrive.datatypes import Affordances, CameraConfig, Command, Control, Obse
 from caldrive.driving.setup import set_up
 from caldrive.interfaces import BadImage
 from caldrive.perception.network.backbone import Backbone
-from caldrive.perception.network.checkpoint import CheckpointError, round_to_half
+from caldrive.perception.network.tensor_file import CheckpointError, round_to_half
 from caldrive.scenarios import Scenario
 from tests.fakes import StraightRoad
 

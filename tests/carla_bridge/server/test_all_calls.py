@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from caldrive.carla_bridge.server.serve import make_server
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.commands.serve_carla import make_server
 from tests.carla_bridge.server.wire_client import RefusedError, WireClient, free_port
 
 V, T = [1.0, 2.0, 3.0], [[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]

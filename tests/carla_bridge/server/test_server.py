@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import msgpack
 import pytest
 
-from caldrive.carla_bridge.server.serve import make_server
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.commands.serve_carla import make_server
 from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, free_port, positions
 
 PORT = free_port()

@@ -11,17 +11,11 @@ from safetensors.torch import save_file
 
 from caldrive.affordances import describe
 from caldrive.files import as_type
-from caldrive.perception.network import checkpoint
-from caldrive.perception.network.checkpoint import (
-    CheckpointError,
-    CheckpointInfo,
-    load_network,
-    read_info,
-    save_network,
-    write_tensors,
-)
+from caldrive.perception.network import checkpoint, tensor_file
+from caldrive.perception.network.checkpoint import CheckpointInfo, load_network, read_info, save_network
 from caldrive.perception.network.config import NETWORKS, NetworkConfig
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import CheckpointError, write_tensors
 from tests.perception.data import TINY
 
 INFO = CheckpointInfo(TINY, {"train_frames": 10}, {"loss": 0.5}, {"steps": 3}, seed=4)
@@ -115,7 +109,7 @@ def test_other_affordances_and_formats_are_refused(
         patch.setattr(checkpoint, "describe", list)
         with pytest.raises(CheckpointError, match="other affordances"):
             load_network(tmp_path / "model.safetensors")
-    monkeypatch.setattr(checkpoint, "FORMAT_VERSION", 99)
+    monkeypatch.setattr(tensor_file, "FORMAT_VERSION", 99)
     with pytest.raises(CheckpointError, match=r"found format 2 .* wanted 99"):
         load_network(tmp_path / "model.safetensors")
 

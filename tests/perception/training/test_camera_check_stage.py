@@ -18,15 +18,9 @@ from caldrive.perception.network.camera_check import (
     evidence,
     load_camera_check,
 )
-from caldrive.perception.network.checkpoint import (
-    CheckpointError,
-    CheckpointInfo,
-    load_network,
-    read_tensors,
-    save_network,
-    write_tensors,
-)
+from caldrive.perception.network.checkpoint import CheckpointInfo, load_network, save_network
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.training.camera_check_stage import (
     BATCH,
     LEAST,

@@ -15,7 +15,7 @@ import torch
 
 from caldrive.affordances import SPECS
 from caldrive.perception.dataset.config import AugmentationConfig
-from caldrive.perception.network.checkpoint import read_tensors
+from caldrive.perception.network.tensor_file import read_tensors
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.perception.training.distributed import ProcessGroup, join_process_group, keep_freed_memory
 from caldrive.perception.training.train import train

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from caldrive.perception.network.checkpoint import CheckpointError
+from caldrive.perception.network.tensor_file import CheckpointError
 from caldrive.perception.training.folder import draw_curves
 from caldrive.perception.training.train import train
 from tests.perception.data import SHORT, TINY

@@ -18,9 +18,10 @@ from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import evaluate
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import backbone_engine
-from caldrive.perception.network.checkpoint import load_network, write_tensors
+from caldrive.perception.network.checkpoint import load_network
 from caldrive.perception.network.config import BlockConfig
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import write_tensors
 from caldrive.perception.training import history_stage
 from caldrive.perception.training.train import train
 from caldrive.recordings.folder import find_episodes, split

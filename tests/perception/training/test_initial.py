@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from caldrive.perception.network.checkpoint import CheckpointError, load_network
+from caldrive.perception.network.checkpoint import load_network
+from caldrive.perception.network.tensor_file import CheckpointError
 from caldrive.perception.training.initial import different_blocks, with_initial_weights
 from caldrive.perception.training.train import train
 from tests.perception.data import SHORT, TINY

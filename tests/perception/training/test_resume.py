@@ -14,7 +14,8 @@ import pytest
 import torch
 
 from caldrive.perception.dataset.config import AugmentationConfig, RecolourConfig
-from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_tensors, write_tensors
+from caldrive.perception.network.checkpoint import load_network
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.training.train import train
 from tests.perception.data import SHORT, TINY, record
 

@@ -12,7 +12,8 @@ from caldrive.files import locked_folder
 from caldrive.perception.dataset.config import AugmentationConfig
 from caldrive.perception.dataset.frames import Frames
 from caldrive.perception.evaluation.evaluate import evaluate
-from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_tensors
+from caldrive.perception.network.checkpoint import load_network
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
 from caldrive.perception.training.loop import read_frames
 from caldrive.perception.training.train import train

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from caldrive.agents.conditional_imitation.config import ImitationNetworkConfig
 from caldrive.agents.conditional_imitation.network import ImitationNetwork
-from caldrive.perception.network.checkpoint import (
+from caldrive.perception.network.tensor_file import (
     is_weight,
     load_state,
     read_known,

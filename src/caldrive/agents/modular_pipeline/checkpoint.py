@@ -8,13 +8,13 @@ from typing import Any
 
 from caldrive.agents.modular_pipeline.config import SegmentationConfig
 from caldrive.agents.modular_pipeline.segmentation import SegmentationNetwork
-from caldrive.perception.network.checkpoint import (
+from caldrive.perception.network.tensor_file import (
+    in_single_precision,
     is_weight,
     load_state,
     read_known,
     read_tensors,
     require_shapes,
-    single_precision,
     write_tensors,
 )
 
@@ -50,5 +50,5 @@ def load_segmentation(path: Path) -> tuple[SegmentationNetwork, SegmentationInfo
     info = read_segmentation_info(path)
     require_shapes(path, lambda: SegmentationNetwork(info.config))
     network = SegmentationNetwork(info.config)
-    load_state(path, network, single_precision(read_tensors(path)[0], camera_check=False))
+    load_state(path, network, in_single_precision(read_tensors(path)[0]))
     return network, info

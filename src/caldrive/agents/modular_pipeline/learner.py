@@ -29,7 +29,7 @@ from caldrive.perception.dataset.sampler import weighted
 from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import autocast
 from caldrive.perception.network.calibration import input_ranges
-from caldrive.perception.network.checkpoint import round_to_half
+from caldrive.perception.network.tensor_file import round_to_half
 from caldrive.perception.training.distributed import join_process_group
 from caldrive.perception.training.folder import TrainingFolder
 from caldrive.perception.training.loop import Stop, finish_as_it_is, never, read_frames, run_training

@@ -12,14 +12,14 @@ from caldrive.agents.reinforcement.config import PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder
 from caldrive.agents.reinforcement.policy import Policy
 from caldrive.perception.network.backbone import Backbone
-from caldrive.perception.network.checkpoint import (
+from caldrive.perception.network.tensor_file import (
     CheckpointError,
+    in_single_precision,
     is_weight,
     load_state,
     read_known,
     read_tensors,
     require_shapes,
-    single_precision,
     write_tensors,
 )
 
@@ -77,7 +77,7 @@ def load_policy(path: Path) -> tuple[Policy, PolicyInfo, Encoder | None]:
         raise CheckpointError(f"found in {path} a policy without its encoder, wanted both: train the policy again")
     require_shapes(path, lambda: _build(info))
     parts = _build(info)
-    load_state(path, parts, single_precision(read_tensors(path)[0], camera_check=False))
+    load_state(path, parts, in_single_precision(read_tensors(path)[0]))
     policy, encoder = parts["policy"], None
     assert isinstance(policy, Policy)
     if info.encoder is not None:

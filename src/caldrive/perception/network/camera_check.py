@@ -16,16 +16,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from caldrive.files import as_type
-from caldrive.perception.network.checkpoint import (
-    CAMERA_CHECK,
-    CheckpointError,
-    is_weight,
-    read_header,
-    read_info,
-    read_tensors,
-    single_precision,
-    write_tensors,
-)
+from caldrive.perception.network.checkpoint import CAMERA_CHECK, read_info, single_precision
+from caldrive.perception.network.tensor_file import CheckpointError, is_weight, read_header, read_tensors, write_tensors
 
 # What may be wrong with an image, in words, and the faults (`perception.camera_faults`) that teach it.
 REASONS: dict[str, tuple[str, ...]] = {

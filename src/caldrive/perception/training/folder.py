@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from caldrive.files import read_json, write_figure, write_whole
-from caldrive.perception.network.checkpoint import UNFINISHED, CheckpointError
+from caldrive.perception.network.tensor_file import UNFINISHED, CheckpointError
 
 Row = dict[str, int | float]  # a step's metrics
 SMOOTHED_STEPS = 50  # that the loss is averaged over in its curve

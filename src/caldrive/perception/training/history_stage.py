@@ -24,13 +24,8 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import BackboneEngine, backbone_engine
 from caldrive.perception.inference.precision import driving_precision
 from caldrive.perception.network.backbone import Backbone
-from caldrive.perception.network.checkpoint import (
-    CheckpointError,
-    read_tensors,
-    round_to_half,
-    write_tensors,
-)
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors, round_to_half, write_tensors
 from caldrive.perception.targets import ClassWeights, multitask_loss
 from caldrive.perception.training.config import TrainingConfig
 from caldrive.perception.training.run import SEED_STRIDE, gradient_step, learning_rate

@@ -9,9 +9,10 @@ import torch
 
 from caldrive.affordances import SPECS
 from caldrive.perception.network.calibration import uncalibrated
-from caldrive.perception.network.checkpoint import CheckpointError, load_network, read_info
+from caldrive.perception.network.checkpoint import load_network, read_info
 from caldrive.perception.network.config import NetworkConfig
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import CheckpointError
 from caldrive.perception.training.config import TrainingConfig
 
 

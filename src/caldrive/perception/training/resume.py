@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.optim import Optimizer
 
 from caldrive.files import as_type
-from caldrive.perception.network.checkpoint import CheckpointError, read_tensors, write_tensors
+from caldrive.perception.network.tensor_file import CheckpointError, read_tensors, write_tensors
 from caldrive.perception.training.run import TrainingRun
 
 KIND = "training"

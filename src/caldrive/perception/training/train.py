@@ -21,9 +21,10 @@ from caldrive.perception.images import normalise, to_float
 from caldrive.perception.inference.engines import autocast
 from caldrive.perception.network.calibration import calibrated, input_ranges
 from caldrive.perception.network.camera_check import add_camera_check, load_camera_check
-from caldrive.perception.network.checkpoint import CheckpointInfo, read_info, round_to_half, save_network
+from caldrive.perception.network.checkpoint import CheckpointInfo, read_info, save_network
 from caldrive.perception.network.config import NetworkConfig
 from caldrive.perception.network.network import Network
+from caldrive.perception.network.tensor_file import round_to_half
 from caldrive.perception.targets import ClassWeights, class_weights, multitask_loss
 from caldrive.perception.training.camera_check_stage import evidence_thresholds, train_camera_check
 from caldrive.perception.training.config import TrainingConfig
