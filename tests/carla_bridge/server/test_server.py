@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import socket
+import struct
 from collections.abc import Iterator
 
 import msgpack
@@ -96,6 +97,25 @@ def run_of_20_ticks(server: Server) -> list[bytes]:
 
 def test_whoever_comes_alone_finds_the_same_world_byte_for_byte(server: Server) -> None:
     assert run_of_20_ticks(server) == run_of_20_ticks(server)
+
+
+def test_who_subscribes_already_hears_of_a_new_episode_with_its_first_step(client: WireClient) -> None:
+    reader = Reader(client, WORLD)
+    old = episode_of(reader.message())
+    client.call("load_new_episode", "", False, 0)
+    client.server.turn(0.1)
+    with pytest.raises(BlockingIOError):  # a client of 0.9.16 that is leaving this stream could not bear it
+        reader.socket.recv(1)
+    assert episode_of(Reader(client, WORLD).message()) == old + 1
+    client.call("tick_cue")
+    told = reader.message()
+    assert episode_of(told) == old + 1
+    assert struct.unpack_from("<I", told, 48 + 32) == (0,)  # no flag that makes it ask back at once
+
+
+def episode_of(snapshot: bytes) -> int:
+    number: int = struct.unpack_from("<Q", snapshot, 48)[0]
+    return number
 
 
 @pytest.mark.parametrize("bytes_", [b"\xc1", b"\x91" * 5000, msgpack.packb([7]), msgpack.packb({}), bytes(range(256))])

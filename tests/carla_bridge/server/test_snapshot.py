@@ -19,7 +19,7 @@ def test_a_header_says_which_sensor_when_and_where() -> None:
 
 
 def test_a_snapshot_begins_with_36_bytes_and_has_119_for_each_actor() -> None:
-    assert len(snapshot.world_head(1, 0.0, 0.1, is_new=True)) == 36
+    assert len(snapshot.world_head(1, 0.0, 0.1)) == 36
     motion = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0))
     row = snapshot.actor_row(300, Placement(1.0, 2.0), motion, b"rest")
     assert len(row) == 119

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, get_type_hints
-
-import msgspec
+from typing import Any
 
 from caldrive.carla_bridge.server.actor_calls import ActorCalls
-from caldrive.carla_bridge.server.calls import call
+from caldrive.carla_bridge.server.calls import arguments_of, call, converted
 from caldrive.carla_bridge.server.layouts import ActorDescription, Layout, Transform, placement
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.vehicle_calls import VehicleCalls
@@ -42,7 +40,7 @@ class Batches:
             (14, actors.simulate_physics), (15, actors.enable_gravity), (16, vehicles.autopilot),
             (17, vehicles.debug_telemetry), (19, actors.set_location), (21, vehicles.set_light),
         ):  # fmt: skip
-            self._commands[number] = method, _arguments(method)
+            self._commands[number] = method, arguments_of(method)
         self._commands[7] = self._follow, tuple[int, Transform, float]
         self._commands[18] = self._set_lights, tuple[int, int]
         self._vehicles = vehicles
@@ -67,11 +65,11 @@ class Batches:
         """A command; future: the actor that is meant by number 0. Raises Refusal."""
         match command:
             case [[0, payload]] if depth < DEEPEST:
-                return self._spawn(caller, _converted(payload, Spawn), depth)
+                return self._spawn(caller, converted(payload, Spawn, "a spawn command"), depth)
             case [[int(index), [int(number), *rest]]] if index in self._commands:
                 method, kind = self._commands[index]
                 number = number or future
-                method(caller, *_converted([number, *rest], kind))
+                method(caller, *converted([number, *rest], kind, f"command {index}"))
                 return number
         raise Refusal("found a command that caldrive does not know, wanted one of CARLA 0.9.16: leave it out")
 
@@ -87,20 +85,3 @@ class Batches:
 
     def _set_lights(self, caller: int, number: int, flags: int) -> None:
         self._vehicles.set_vehicle_lights(caller, number, (flags,))
-
-
-def _arguments(method: Callable[..., Any]) -> Any:
-    """What a call takes, as a tuple's type."""
-    hints = get_type_hints(method)
-    kinds = tuple(hint for name, hint in hints.items() if name not in ("caller", "return"))
-    return tuple[kinds]  # type: ignore[valid-type]
-
-
-def _converted(payload: Any, kind: Any) -> Any:
-    """A command's payload in its type. Raises Refusal."""
-    try:
-        return msgspec.convert(payload, kind)
-    except (msgspec.ValidationError, RecursionError) as error:
-        raise Refusal(
-            f"found a command whose values it does not take ({error}), wanted those of CARLA 0.9.16"
-        ) from error

@@ -41,13 +41,27 @@ def calls_of(table: object) -> dict[str, Call]:
     found = {}
     for _, method in inspect.getmembers(table, inspect.ismethod):
         for name, is_bare in getattr(method, "calls", ()):
-            hints = get_type_hints(method.__func__)
-            names = list(inspect.signature(method).parameters.values())[1:]
-            kinds = tuple(hints[parameter.name] for parameter in names)
-            least = sum(parameter.default is inspect.Parameter.empty for parameter in names)
-            arguments = tuple[kinds] if kinds else tuple[()]  # type: ignore[valid-type]
-            found[name] = Call(method, arguments, least, hints["return"] is type(None), is_bare)
+            parameters = list(inspect.signature(method).parameters.values())[1:]
+            least = sum(one.default is inspect.Parameter.empty for one in parameters)
+            is_void = get_type_hints(method)["return"] is type(None)
+            found[name] = Call(method, arguments_of(method), least, is_void, is_bare)
     return found
+
+
+def arguments_of(method: Callable[..., Any]) -> Any:
+    """What a method takes after its caller's number, as a tuple's type."""
+    kinds = tuple(hint for name, hint in get_type_hints(method).items() if name not in ("caller", "return"))
+    return tuple[kinds] if kinds else tuple[()]  # type: ignore[valid-type]
+
+
+def converted(given: Any, kind: Any, what: str) -> Any:
+    """Values in their type. Raises Refusal where they are others; what: whose values they are."""
+    try:
+        return msgspec.convert(given, kind)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise Refusal(
+            f"found values of {what} that it does not take ({error}), wanted those of CARLA 0.9.16: use its client"
+        ) from error
 
 
 def serve(calls: Mapping[str, Call], caller: int, request: Request) -> Any:
@@ -73,11 +87,5 @@ def _arguments(found: Call, request: Request) -> tuple[Any, ...]:
             f"found {len(given)} arguments of {request.method}, wanted {most}: use the client of CARLA 0.9.16"
         )
     kinds = found.arguments if len(given) == most else tuple[found.arguments.__args__[: len(given)]]  # type: ignore[misc]
-    try:
-        converted: tuple[Any, ...] = msgspec.convert(given, kinds)
-    except (msgspec.ValidationError, RecursionError) as error:
-        raise Refusal(
-            f"found arguments of {request.method} that it does not take ({error}), wanted those of CARLA 0.9.16: "
-            "use its client"
-        ) from error
-    return converted
+    values: tuple[Any, ...] = converted(given, kinds, request.method)
+    return values

@@ -41,7 +41,6 @@ class Episode:
 
     def __init__(self, number: int, town: Town, settings: ServerSettings, signs: dict[str, str]) -> None:
         self.number, self.town, self.time, self.delta = number, town, 0.0, 0.0
-        self.is_new = True
         self.hits: list[Hit] = []
         self._steps, self._numbers = 0, count(1)
         self.set_weather(as_carla(weather(settings.weather)))

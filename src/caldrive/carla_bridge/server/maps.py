@@ -73,6 +73,7 @@ def spawn_points(roads: RoadNetwork) -> list[Placement]:
     return [standing(lane.line.pose_at(s), SPAWN_HEIGHT) for lane, s in start_places(roads)]
 
 
+@lru_cache(maxsize=2)
 def signal_ids(town: str, roads: RoadNetwork) -> dict[str, str]:
     """The ids that a town's lights have on its map, by those of their posts."""
     if town.endswith(".xodr"):

@@ -69,7 +69,7 @@ class Senses:
     """All sensors of a town. Its camera rig is made when it is first needed."""
 
     def __init__(self, town: Town) -> None:
-        self._town = town
+        self.town = town
         self._rig: CameraRig | None = None
         self._say: dict[str, Callable[[SensorActor, Episode], Iterator[tuple[Sensor, Message]]]] = {
             "sensor.camera.rgb": self._rgb, "sensor.camera.depth": self._depth,
@@ -101,7 +101,7 @@ class Senses:
     def rig(self) -> CameraRig:
         """The town's."""
         if self._rig is None:
-            self._rig = CameraRig(self._town)
+            self._rig = CameraRig(self.town)
         return self._rig
 
     def _rgb(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:

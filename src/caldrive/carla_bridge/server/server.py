@@ -11,7 +11,7 @@ import selectors
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from typing import Any
 
 from caldrive.carla_bridge.server import snapshot
@@ -26,7 +26,7 @@ from caldrive.carla_bridge.server.sensors import Senses, SensorActor
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
 from caldrive.carla_bridge.server.wire import Request, refused
-from caldrive.world.town import Town, load_town
+from caldrive.world.town import load_town
 
 FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
 GRACE = 1.0  # s after a call until the clock begins to move the world: time to ask for synchronous mode
@@ -45,18 +45,22 @@ class Server:
         """Traffic managers that clients run: port to host and owner."""
         self.calls: dict[str, Call] = {}
         self._first_call, self._next_step = math.inf, math.inf  # s by the clock
-        self._senses: Senses | None = None
-        self._latest: Sequence[Any] | None = None
-        self.clients = Clients(listening(settings.host, settings.port), self.log, self._result, self._forget)
-        try:
-            self.streams = Streams(listening(settings.host, settings.port + 1), self.log, self._newcomer)
-        except BaseException:
-            self.clients.close()
-            raise
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self.clients, selectors.EVENT_READ, self.clients.poll)
-        self._selector.register(self.streams, selectors.EVENT_READ, self.streams.poll)
-        self.episode = self._begin(settings.town)
+        with ExitStack() as stack:
+            host, port = settings.host, settings.port
+            self.clients = Clients(listening(host, port), self.log, self._result, self._forget)
+            stack.enter_context(closing(self.clients))
+            self.streams = Streams(listening(host, port + 1), self.log, self._newcomer)
+            stack.enter_context(closing(self.streams))
+            self._selector = stack.enter_context(selectors.DefaultSelector())
+            for one in (self.clients, self.streams):
+                self._selector.register(one, selectors.EVENT_READ, one.poll)
+            self._senses = Senses(load_town(settings.town))
+            stack.callback(lambda: self._senses.close())
+            self.episode = self._begin(settings.town)
+            stack.callback(lambda: self.episode.close())
+            self._latest = self._snapshot()
+            self.close = stack.pop_all().close
+            """Ends it all."""
 
     def log(self, sentence: str) -> None:
         """Says something on stderr, if anybody can hear it."""
@@ -68,32 +72,33 @@ class Server:
         town = load_town(town_name)
         self._episodes += 1
         episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads))
-        if self._senses is None or self._town is not town:
-            if self._senses is not None:
-                self._senses.close()
-            self._town: Town = town
+        if self._senses.town is not town:
+            self._senses.close()
             self._senses = Senses(town)
         return episode
 
     def begin(self, town: str | None = None) -> None:
         """Ends the episode and begins another, in the same town or another. Raises ValueError, OSError or RuntimeError
-        where there cannot be one; then the old town begins again."""
+        where there cannot be one; then the old town begins again.
+
+        Who subscribes already hears of it with the next step, which the clock makes after a while: a client that loads
+        a world leaves its old subscription, and crashes where something comes in on it at that moment."""
         old = self.episode.town.name
         load_town(town or old)  # a map that cannot be read costs nothing
         for actor in self.sensors():
             self.streams.close_stream(actor.stream)
         self.episode.close()
+        self._next_step = max(self._next_step, time.monotonic() + GRACE)
         try:
             self.episode = self._begin(town or old)
         except (ValueError, OSError, RuntimeError):
             self.episode = self._begin(old)
             raise
         finally:
-            self._note()
+            self._latest = self._snapshot()
 
     def warm_up(self) -> None:
         """Does once what clients would have to wait for the first time; then all is as it was."""
-        assert self._senses is not None
         self.episode.step(FREE_STEP)
         self._senses.warm_up(self.episode)
         self.begin()
@@ -159,7 +164,8 @@ class Server:
 
     def set_rules(self, rules: Settings, owner: int) -> None:
         """Other settings from now on, of a client that they go with."""
-        self.rules, self.rules_owner, self._next_step = rules, owner, time.monotonic()
+        self.rules, self.rules_owner = rules, owner
+        self._next_step = max(self._next_step, time.monotonic())
 
     def sensors(self) -> list[SensorActor]:
         """Those that clients have spawned."""
@@ -176,7 +182,8 @@ class Server:
         self.streams.settle()
         self.frame += 1
         self.episode.step(min(self.rules.delta or FREE_STEP, LONGEST_STEP))
-        self._note()
+        self._latest = self._snapshot()
+        self.streams.send(WORLD, self._latest)
         for sensor in self.sensors():
             is_drawn = ".camera." in sensor.kind
             if self.streams.is_wanted(sensor.stream) and not (is_drawn and self.rules.no_rendering):
@@ -185,7 +192,6 @@ class Server:
 
     def _hear_sensor(self, sensor: SensorActor) -> None:
         """Sends what a sensor says. A fault costs its stream."""
-        assert self._senses is not None
         try:
             for message in self._senses.messages(sensor, self.episode, self.frame):
                 self.streams.send(sensor.stream, message)
@@ -193,28 +199,13 @@ class Server:
             self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: its stream ends")
             self.streams.close_stream(sensor.stream)
 
-    def _note(self) -> None:
-        """Tells everybody who is where."""
+    def _snapshot(self) -> Sequence[Any]:
+        """Who is where now."""
         episode = self.episode
-        head = snapshot.world_head(episode.number, episode.time, episode.delta, episode.is_new)
-        episode.is_new = False
         place = snapshot.header(snapshot.Sensor.WORLD, self.frame, episode.time)
-        self._latest = [b"".join((place, head, *episode.rows()))]
-        self.streams.send(WORLD, self._latest)
+        head = snapshot.world_head(episode.number, episode.time, episode.delta)
+        return [b"".join((place, head, *episode.rows()))]
 
     def _newcomer(self, stream: int) -> Sequence[Any] | None:
         """What a new subscriber gets at once: the latest snapshot."""
-        if stream != WORLD:
-            return None
-        if self._latest is None:
-            self._note()
-        return self._latest
-
-    def close(self) -> None:
-        """Ends it all."""
-        self._selector.close()
-        self.clients.close()
-        self.streams.close()
-        self.episode.close()
-        if self._senses is not None:
-            self._senses.close()
+        return self._latest if stream == WORLD else None

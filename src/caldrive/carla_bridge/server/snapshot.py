@@ -10,7 +10,6 @@ from caldrive.carla_bridge.server.layouts import VehicleControl, WalkerControl
 
 HEADER = struct.Struct("<QQd6f")
 WORLD_HEAD = struct.Struct("<QdfiiiI")
-MAP_CHANGED = 1  # a flag in it
 ACTOR = struct.Struct("<IB15f54s")
 VEHICLE = struct.Struct("<3f3Bif2BIB")
 WALKER = struct.Struct("<4fB")
@@ -39,9 +38,12 @@ def header(sensor: Sensor, frame: int, time: float, place: Placement | None = No
     return HEADER.pack(sensor, frame, time, *(to_carla(place) if place else (0.0,) * 6))
 
 
-def world_head(episode: int, time: float, delta: float, is_new: bool) -> bytes:
-    """What a snapshot begins with, before its actors; time and delta in s."""
-    return WORLD_HEAD.pack(episode, time, delta, 0, 0, 0, MAP_CHANGED if is_new else 0)
+def world_head(episode: int, time: float, delta: float) -> bytes:
+    """What a snapshot begins with, before its actors; time and delta in s.
+
+    No flag says that the map has changed: the episode's number does. On the flag a client asks for street lamps from
+    within the thread that reads snapshots, and it crashes if it leaves the episode meanwhile."""
+    return WORLD_HEAD.pack(episode, time, delta, 0, 0, 0, 0)
 
 
 def actor_row(id: int, place: Placement, motion: tuple[Triple, Triple, Triple], rest: bytes = b"") -> bytes:

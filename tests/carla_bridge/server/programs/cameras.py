@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 
 import carla
 import numpy as np
 
-from tests.carla_bridge.server.programs.session import Listener, connect, spawned, straight, synchronous
+from tests.carla_bridge.server.programs.session import Listener, connect, run, spawned, straight, synchronous
 
 SIZE = {"image_size_x": "96", "image_size_y": "64"}
 TICKS = 12
@@ -46,8 +45,7 @@ def main() -> None:
     for one in (*cameras, gnss):
         one.sensor.destroy()
     car.destroy()
-    os._exit(0)  # the wheel may crash where Python takes it down while its threads still run
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

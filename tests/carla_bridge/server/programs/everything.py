@@ -7,7 +7,7 @@ import math
 import carla
 import pytest
 
-from tests.carla_bridge.server.programs.session import Listener, connect, spawned, straight, synchronous
+from tests.carla_bridge.server.programs.session import Listener, connect, run, spawned, straight, synchronous
 
 
 def main() -> None:
@@ -129,4 +129,4 @@ def refuse(world: carla.World, car: carla.Vehicle) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import carla
 
 PATIENCE = 300.0  # s
+
+
+def run(main: Callable[[], None]) -> None:
+    """Runs a program, and ends it at once: the wheel may crash where Python takes it down while its threads still
+    run."""
+    main()
+    sys.stdout.flush()
+    os._exit(0)
 
 
 def connect() -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 
 import carla
 
-from tests.carla_bridge.server.programs.session import connect, synchronous
+from tests.carla_bridge.server.programs.session import connect, run, synchronous
 
 CARS, WALKERS, TICKS = 4, 3, 120
 NOBODY = 0
@@ -67,4 +67,4 @@ def spawn_walkers(client: Any, world: Any) -> tuple[list[Any], list[Any]]:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)
