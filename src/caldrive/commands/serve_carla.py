@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.checks import require_writable_file
 from caldrive.commands.answer import Answer, Output
 from caldrive.progress import Progress
 
 if TYPE_CHECKING:  # it needs msgpack, which may be missing
+    from caldrive.carla_bridge.server.run_recording import RunRecording
     from caldrive.carla_bridge.server.server import Server
 
 
@@ -19,20 +25,35 @@ class ServeCarla(ServerSettings, Output):
 
     def run(self, progress: Progress) -> Answer:
         """Serves; answers when it is stopped."""
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # what is recorded is written to its end, too
         progress(f"loading {self.town}", 0.0)
-        server = make_server(self)
-        try:
+        with _recording(self.record) as recording, closing(make_server(self, recording)) as server:
             progress("getting ready to draw", 0.5)
             server.warm_up()
             progress(f"serving {self.town}", 1.0)
             server.log(f"CARLA's client may connect to {self.host}:{self.port} ({self.town}); Ctrl-C ends it")
-            server.run()
-        finally:
-            server.close()
-        return Answer({"port": self.port}, "served")
+            with suppress(KeyboardInterrupt):
+                server.run()
+        return Answer({"port": self.port}, "stopped")
 
 
-def make_server(settings: ServerSettings) -> Server:
+@contextmanager
+def _recording(path: Path | None) -> Iterator[RunRecording | None]:
+    """What is told of all that clients do, None without a file. Raises ValueError, OSError or RuntimeError where it
+    cannot be written."""
+    if path is None:
+        yield None
+        return
+    from caldrive.visualization.mcap_file import ENDING, McapFile
+
+    require_writable_file(path, "--record", ENDING)
+    with McapFile(path) as file:
+        from caldrive.carla_bridge.server.run_recording import RunRecording
+
+        yield RunRecording(file)
+
+
+def make_server(settings: ServerSettings, recording: RunRecording | None = None) -> Server:
     """A server that waits for clients. Raises OSError where a port is taken, ValueError for a town that cannot be,
     RuntimeError without msgpack."""
     try:
@@ -50,7 +71,7 @@ def make_server(settings: ServerSettings) -> Server:
     from caldrive.carla_bridge.server.vehicle_calls import VehicleCalls
     from caldrive.carla_bridge.server.world_calls import WorldCalls, other_calls
 
-    server = Server(settings)
+    server = Server(settings, recording)
     actors = ActorCalls(server)
     vehicles = VehicleCalls(server, actors)
     server.calls = other_calls()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -28,8 +29,8 @@ def environment() -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """What a server says that runs until the last test."""
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen[bytes]]:
+    """A server that runs until the last test."""
     said = tmp_path_factory.mktemp("server") / "said.txt"
     command = [sys.executable, "-m", "caldrive", "serve-carla", "--port", str(PORT)]
     with said.open("wb") as file, subprocess.Popen(command, env=environment(), stderr=file, stdout=file) as process:
@@ -38,9 +39,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             assert process.poll() is None, said.read_text()
             assert time.monotonic() < deadline
             time.sleep(0.1)
-        yield said
-        assert process.poll() is None, said.read_text()
-        process.terminate()
+        yield process
+        assert process.poll() in (None, -signal.SIGKILL), said.read_text()
+        process.kill()
     assert "found a fault" not in said.read_text()
 
 
@@ -59,8 +60,9 @@ def run(program: str, *arguments: str) -> Any:
     return json.loads(said) if said.strip().startswith("{") else said
 
 
-def test_cameras_come_in_step_with_ticks_and_show_what_they_should(server: Path) -> None:
+def test_cameras_come_in_step_with_ticks_and_show_what_they_should(server: subprocess.Popen[bytes]) -> None:
     found = run("cameras")
+    assert found["frames"] == 12
     assert found["moved"] > 1.0
     assert found["speed"] > 2.0
     assert found["spread"] > 20  # a picture of something
@@ -72,23 +74,33 @@ def test_cameras_come_in_step_with_ticks_and_show_what_they_should(server: Path)
     assert found["longitude_error"] < 1e-7
 
 
-def test_the_same_program_gets_the_same_images(server: Path) -> None:
+def test_the_same_program_gets_the_same_images(server: subprocess.Popen[bytes]) -> None:
     assert run("cameras") == run("cameras")
 
 
-def test_every_kind_of_call_works_through_the_client(server: Path) -> None:
+def test_every_kind_of_call_works_through_the_client(server: subprocess.Popen[bytes]) -> None:
     run("everything")
 
 
-def test_the_clients_traffic_manager_and_crowd_drive_and_walk(server: Path) -> None:
+def test_the_clients_traffic_manager_and_crowd_drive_and_walk(server: subprocess.Popen[bytes]) -> None:
     found = run("traffic", str(MANAGER))
     assert min(found["cars"]) > 3.0
     assert max(found["walkers"]) > 2.0
 
 
-def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server: Path) -> None:
+def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server: subprocess.Popen[bytes]) -> None:
     for k in range(5):
         with start("cameras") as process:
             time.sleep(0.15 * (k + 1))
             process.kill()
     assert run("cameras")["moved"] > 1.0
+
+
+def test_a_client_whose_server_is_killed_is_told_so(server: subprocess.Popen[bytes]) -> None:  # the last test
+    with start("bereft") as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ticking\n"
+        server.kill()
+        said, complaints = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, complaints
+    assert "time-out" in json.loads(said)["said"]

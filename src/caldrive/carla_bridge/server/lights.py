@@ -12,7 +12,7 @@ from caldrive.carla_bridge.axes import standing
 from caldrive.carla_bridge.server.actors import Actor, description
 from caldrive.carla_bridge.server.layouts import BoundingBox, Vector
 from caldrive.carla_bridge.server.snapshot import Triple, light_part
-from caldrive.datatypes import LightState, Points, Pose
+from caldrive.datatypes import LightState, Points, Pose, TrafficLight
 from caldrive.geometry import moved, to_local
 from caldrive.world.roads.network import LightPost, RoadNetwork
 from caldrive.world.traffic.traffic_lights import TrafficLights
@@ -107,10 +107,14 @@ class LightKeeper:
             if light.held is not None and time > light.held[1] and not self.is_frozen(light):
                 light.held = None
                 self._pass_on(light.post.light)
-        shown = {light.id: light.state for light in self._lights.states()}
+        shown = {light.id: light.state for light in self.shown()}
         for light in self.actors:
             if shown[light.post.id] is not light.state:
                 light.state, light.since = shown[light.post.id], time
+
+    def shown(self) -> tuple[TrafficLight, ...]:
+        """All lights as the embedded world knows them."""
+        return self._lights.states()
 
     def _pass_on(self, junction: str) -> None:
         held = {one.number: one.held[0] for one in self.actors if one.post.light == junction and one.held}

@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from caldrive.carla_bridge.server import snapshot
 from caldrive.carla_bridge.server.actors import Actor
@@ -22,11 +22,14 @@ from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
-from caldrive.carla_bridge.server.sensors import Senses, SensorActor
+from caldrive.carla_bridge.server.sensors import Message, Senses, SensorActor
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
 from caldrive.carla_bridge.server.wire import Request, refused
 from caldrive.world.town import load_town
+
+if TYPE_CHECKING:  # it needs what draws
+    from caldrive.carla_bridge.server.run_recording import RunRecording
 
 FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
 GRACE = 1.0  # s after a call until the clock begins to move the world: time to ask for synchronous mode
@@ -37,8 +40,8 @@ LONGEST_STEP = 1.0  # s
 class Server:
     """One world, and all clients of it. Raises OSError where a port is taken, ValueError for a town that cannot be."""
 
-    def __init__(self, settings: ServerSettings) -> None:
-        self.settings, self.maps = settings, Maps(settings.maps)
+    def __init__(self, settings: ServerSettings, recording: RunRecording | None = None) -> None:
+        self.settings, self.maps, self._recording = settings, Maps(settings.maps), recording
         self.rules, self.rules_owner = Settings(), 0
         self.frame, self._episodes = 0, 0
         self.managers: dict[int, tuple[str, int]] = {}
@@ -184,20 +187,35 @@ class Server:
         self.episode.step(min(self.rules.delta or FREE_STEP, LONGEST_STEP))
         self._latest = self._snapshot()
         self.streams.send(WORLD, self._latest)
+        heard = []
         for sensor in self.sensors():
             is_drawn = ".camera." in sensor.kind
             if self.streams.is_wanted(sensor.stream) and not (is_drawn and self.rules.no_rendering):
-                self._hear_sensor(sensor)
+                heard += [(sensor, message) for message in self._hear_sensor(sensor)]
+        self._record(heard)
         return self.frame
 
-    def _hear_sensor(self, sensor: SensorActor) -> None:
+    def _hear_sensor(self, sensor: SensorActor) -> list[Message]:
         """Sends what a sensor says. A fault costs its stream."""
         try:
-            for message in self._senses.messages(sensor, self.episode, self.frame):
+            messages = list(self._senses.messages(sensor, self.episode, self.frame))
+            for message in messages:
                 self.streams.send(sensor.stream, message)
         except Exception as error:  # a place or a lens that nobody thought of
             self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: its stream ends")
             self.streams.close_stream(sensor.stream)
+            return []
+        return messages
+
+    def _record(self, heard: Sequence[tuple[SensorActor, Message]]) -> None:
+        """Takes down the last step. A full disk ends the recording, and not the server."""
+        if self._recording is None:
+            return
+        try:
+            self._recording.step(self.episode, heard)
+        except OSError as error:
+            self.log(f"found that {self.settings.record} cannot be written ({error.strerror}), wanted room: it ends")
+            self._recording = None
 
     def _snapshot(self) -> Sequence[Any]:
         """Who is where now."""

@@ -33,6 +33,9 @@ class ServerSettings:
     """People on the sidewalks; clients see them as walkers."""
     seed: int = 0
     """For cars, people and lights."""
+    record: Path | None = None
+    """Also write what clients do to a file (.mcap) for Foxglove, Lichtblick or Rerun; it is there when the server
+    ends."""
     keep: bool = False
     """Keep what a client spawned and set when it has gone, as CARLA does."""
 

@@ -18,7 +18,7 @@ def main() -> None:
     client = connect()
     synchronous(client.get_world())
     world = client.reload_world(False)  # from here on nothing depends on how fast this process is
-    first = world.get_snapshot().frame
+    first = world.tick()
     start = straight(world)[0]
     car = spawned(world, "vehicle.tesla.model3", start)
     mount = carla.Transform(carla.Location(x=1.5, z=2.4), carla.Rotation(pitch=-5.0))
