@@ -65,14 +65,14 @@ def compose(parent: Placement, child: Placement) -> Placement:
             parent.x + c * child.x - s * child.y, parent.y + s * child.x + c * child.y, parent.z + child.z,
             math.remainder(parent.heading + child.heading, math.tau), child.pitch, child.roll,
         )  # fmt: skip
-    turned = _rotation(parent)
+    turned = rotation(parent)
     x, y, z = (np.array((parent.x, parent.y, parent.z)) + turned @ (child.x, child.y, child.z)).tolist()
-    r = (turned @ _rotation(child)).tolist()
+    r = (turned @ rotation(child)).tolist()
     pitch = math.asin(max(-1.0, min(1.0, r[2][0])))
     return Placement(x, y, z, math.atan2(r[1][0], r[0][0]), pitch, math.atan2(r[2][1], r[2][2]))
 
 
-def _rotation(place: Placement) -> NDArray[np.float64]:
+def rotation(place: Placement) -> NDArray[np.float64]:
     """(3, 3): from its own axes to the world's."""
     (ch, sh), (cp, sp), (cr, sr) = (
         (math.cos(angle), math.sin(angle)) for angle in (place.heading, place.pitch, place.roll)

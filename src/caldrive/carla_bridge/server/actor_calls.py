@@ -92,7 +92,7 @@ class ActorCalls:
     def _made(self, asked: ActorDescription, at: Placement, carrier: Actor | None) -> Actor:
         """The actor, still without a number. Raises Refusal where it cannot be."""
         kind = asked.id
-        if kind.removeprefix("sensor.") in NOT_DRAWN or kind == "sensor.lidar.ray_cast":
+        if kind.removeprefix("sensor.") in NOT_DRAWN:
             raise Refusal(f"found {kind}, which caldrive does not simulate, wanted another sensor: see docs/carla.md")
         if kind.startswith("sensor."):
             streams = 0 if kind == "sensor.other.lane_invasion" else 1

@@ -78,7 +78,7 @@ PROPS = (
     ("static.prop.warningconstruction", 0.4, 1.2, 1.1), ("static.prop.trafficwarning", 2.8, 2.4, 3.5),
 )  # fmt: skip
 CAMERAS = ("rgb", "depth", "semantic_segmentation")
-NOT_DRAWN = ("camera.instance_segmentation", "camera.dvs", "camera.optical_flow", "camera.normals", "other.radar",
+NOT_DRAWN = ("camera.instance_segmentation", "camera.dvs", "camera.optical_flow", "camera.normals",
              "lidar.ray_cast_semantic", "other.rss")  # fmt: skip
 _LENS = {
     "lens_circle_falloff": "5.0", "lens_circle_multiplier": "0.0", "lens_k": "-1.0", "lens_kcube": "0.0",
@@ -159,6 +159,7 @@ _SENSORS: dict[str, dict[str, str]] = {
         "horizontal_fov": "360.0", "atmosphere_attenuation_rate": "0.004", "dropoff_general_rate": "0.45",
         "dropoff_intensity_limit": "0.8", "dropoff_zero_intensity": "0.4", "noise_stddev": "0.0",
     },
+    "sensor.other.radar": {"horizontal_fov": "30.0", "vertical_fov": "30.0", "range": "100.0"},
 }  # fmt: skip
 
 
@@ -166,6 +167,8 @@ def _sensor(id: str) -> list[Attribute]:
     attributes = [*_names("front"), _free("sensor_tick", FLOAT, "0.0"), *_floats(_SENSORS[id])]
     if id == "sensor.lidar.ray_cast":
         attributes += [_free("channels", INT, "32"), _free("points_per_second", INT, "56000")]
+    if id == "sensor.other.radar":
+        attributes.append(_free("points_per_second", INT, "1500"))
     if id == "sensor.other.obstacle":
         attributes += [_free("only_dynamics", BOOL, "false"), _free("debug_linetrace", BOOL, "false")]
     return attributes

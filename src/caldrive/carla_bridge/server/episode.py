@@ -94,7 +94,7 @@ class Episode:
 
     def has_room(self, box: VehicleState) -> bool:
         """Whether a new body fits there."""
-        return is_free(box, self._bodies(), self.all(Prop), self.town.obstacles)
+        return is_free(box, self.bodies(), self.all(Prop), self.town.obstacles)
 
     def actor_of(self, name: str) -> Actor | None:
         """The actor behind the id of a car or a person, None for what stands in the town."""
@@ -113,7 +113,7 @@ class Episode:
             walker.step(delta)
         self._population.move_to(self.time, [one.box_state() for one in vehicles], self._walker_states())
         self._take_down()
-        self.hits = resolve_contacts(vehicles, self._bodies(), self.all(Prop), self.town.obstacles)
+        self.hits = resolve_contacts(vehicles, self.bodies(), self.all(Prop), self.town.obstacles)
         if self._steps % LOOK_AT_LIMITS == 1:
             for vehicle in vehicles:
                 vehicle.limit = self._limit_at(vehicle)
@@ -157,7 +157,7 @@ class Episode:
             for one in self.all(Walker)
         ]
 
-    def _bodies(self) -> list[VehicleState | PedestrianState]:
+    def bodies(self) -> list[VehicleState | PedestrianState]:
         """Everybody who moves."""
         return [*self.cars, *self.people, *(one.box_state() for one in self.all(Vehicle)), *self._walker_states()]
 

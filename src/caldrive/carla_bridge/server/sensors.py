@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,11 @@ from caldrive.carla_bridge.server.actors import Actor, Prop, description
 from caldrive.carla_bridge.server.contacts import prop_box, way_ahead
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import BoundingBox
+from caldrive.carla_bridge.server.ranging import Rays, detections, lidar_settings, radar_settings, scan
 from caldrive.carla_bridge.server.snapshot import Sensor, header
 from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.checks import MOST_PIXELS
-from caldrive.datatypes import Contact, Semantic
+from caldrive.datatypes import Semantic
 from caldrive.world.rendering.camera import CameraRig
 from caldrive.world.rendering.pinhole import PinholeCamera
 from caldrive.world.town import Town
@@ -50,7 +51,8 @@ class SensorActor(Actor):
     """Of an image, pixels."""
     fov: float = 90.0
     """Degrees."""
-    hits: list[Contact] = field(default_factory=list)
+    angle: float = 0.0
+    """Of a lidar's turn, rad."""
 
 
 def checked(sensor: SensorActor) -> SensorActor:
@@ -62,6 +64,10 @@ def checked(sensor: SensorActor) -> SensorActor:
         if width * height > MOST_AREA:
             raise Refusal(f"found an image of {width} x {height}, wanted {MOST_AREA} pixels at most: ask for fewer")
         sensor.size, sensor.fov = (width, height), asked.number("fov", 90.0, 1.0, 170.0)
+    if sensor.kind == "sensor.lidar.ray_cast":
+        lidar_settings(asked)
+    if sensor.kind == "sensor.other.radar":
+        radar_settings(asked)
     return sensor
 
 
@@ -75,6 +81,7 @@ class Senses:
             "sensor.camera.rgb": self._rgb, "sensor.camera.depth": self._depth,
             "sensor.camera.semantic_segmentation": self._semantic, "sensor.other.gnss": _gnss,
             "sensor.other.imu": _imu, "sensor.other.collision": _collisions, "sensor.other.obstacle": _obstacle,
+            "sensor.lidar.ray_cast": self._lidar, "sensor.other.radar": self._radar,
         }  # fmt: skip
 
     def messages(self, sensor: SensorActor, episode: Episode, frame: int) -> Iterator[Message]:
@@ -118,6 +125,27 @@ class Senses:
         shares = np.minimum(distances, FARTHEST).astype(np.float64) / FARTHEST
         steps = (shares * DEPTH_STEPS).astype(np.uint32)
         yield Sensor.DEPTH, _image(sensor, np.stack((steps >> 16, steps >> 8 & 255, steps & 255), axis=-1))
+
+    def _lidar(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
+        lidar, rays = lidar_settings(sensor.description), self._rays(sensor, episode)
+        found = scan(lidar, sensor.place, sensor.angle, rays)
+        sensor.angle = math.fmod(sensor.angle + lidar.turned(rays.delta), lidar.width)
+        head = np.array([len(found.counts), *found.counts], "<u4").tobytes()
+        points = (found.points * (1.0, -1.0, 1.0, 1.0)).astype("<f4")  # x, y to the right, z, intensity
+        yield Sensor.LIDAR, [np.array([sensor.angle], "<f4").tobytes() + head, points.tobytes()]
+
+    def _radar(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
+        vx, vy, _ = (sensor.parent or sensor).motion[0]
+        found = detections(
+            radar_settings(sensor.description), sensor.place, (vx, -vy), episode.bodies(), self._rays(sensor, episode)
+        )
+        yield Sensor.RADAR, [(found * (1.0, -1.0, 1.0, 1.0)).astype("<f4").tobytes()]  # speed, right, up, distance
+
+    def _rays(self, sensor: SensorActor, episode: Episode) -> Rays:
+        """The same in each run of the same program."""
+        scene = episode.scene(sensor.place, sensor.parent)
+        rng = np.random.default_rng((sensor.id, round(1000 * episode.time)))
+        return Rays(max(sensor.every, episode.delta), lambda camera: self.rig.distances_from(camera, scene), rng)
 
 
 def camera_of(sensor: SensorActor) -> PinholeCamera:

@@ -27,6 +27,7 @@ class Sensor(IntEnum):
     GNSS = 4
     IMU = 5
     OBSTACLE = 7
+    RADAR = 9
     LIDAR = 11
     RGB = 13
     SEMANTIC = 14

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import carla
+import numpy as np
 import pytest
 
 from tests.carla_bridge.server.programs.session import Listener, connect, run, spawned, straight, synchronous
@@ -35,6 +36,7 @@ def main() -> None:
     for _ in range(10):
         world.tick()
     assert abs(walker.get_location().distance(before) - 1.5) < 0.1
+    measure_distances(world, car)
     refuse(world, car)
     imu.sensor.destroy()
     assert walker.destroy()
@@ -124,8 +126,25 @@ def weather(world: carla.World) -> None:
 
 
 def refuse(world: carla.World, car: carla.Vehicle) -> None:
-    with pytest.raises(RuntimeError, match=r"found sensor\.lidar\.ray_cast"):
-        spawned(world, "sensor.lidar.ray_cast", carla.Transform(), car)
+    with pytest.raises(RuntimeError, match=r"found sensor\.camera\.dvs"):
+        spawned(world, "sensor.camera.dvs", carla.Transform(), car)
+
+
+def measure_distances(world: carla.World, car: carla.Vehicle) -> None:
+    on_top, ahead = carla.Transform(carla.Location(z=2.4)), carla.Transform(carla.Location(x=2.5, z=1.0))
+    lidar = Listener(spawned(world, "sensor.lidar.ray_cast", on_top, car, channels="16"))
+    radar = Listener(spawned(world, "sensor.other.radar", ahead, car, horizontal_fov="20"))
+    frame = world.tick()
+    cloud, found = lidar.at(frame), radar.at(frame)
+    points = np.frombuffer(cloud.raw_data, np.float32).reshape(-1, 4)
+    assert cloud.channels == 16
+    assert sum(cloud.get_point_count(k) for k in range(16)) == len(points) > 500
+    assert abs(points[:, 2].min() + 2.4) < 0.1  # the road
+    assert np.linalg.norm(points[:, :3], axis=1).max() < 10.0
+    assert 0 < len(found) <= 150
+    assert all(one.depth < 100.0 and abs(one.azimuth) < 0.18 for one in found)
+    for one in (lidar, radar):
+        one.sensor.destroy()
 
 
 if __name__ == "__main__":
