@@ -66,6 +66,7 @@ def make_server(settings: ServerSettings, recording: RunRecording | None = None)
         ) from error
     from caldrive.carla_bridge.server.batch import Batches
     from caldrive.carla_bridge.server.calls import calls_of
+    from caldrive.carla_bridge.server.light_calls import LightCalls
     from caldrive.carla_bridge.server.server import Server
     from caldrive.carla_bridge.server.session_calls import SessionCalls
     from caldrive.carla_bridge.server.vehicle_calls import VehicleCalls
@@ -73,8 +74,9 @@ def make_server(settings: ServerSettings, recording: RunRecording | None = None)
 
     server = Server(settings, recording)
     actors = ActorCalls(server)
-    vehicles = VehicleCalls(server, actors)
+    vehicles, lights = VehicleCalls(server, actors), LightCalls(server, actors)
+    others = SessionCalls(server), Batches(server, actors, vehicles, lights), WorldCalls(server)
     server.calls = other_calls()
-    for table in (SessionCalls(server), actors, vehicles, Batches(server, actors, vehicles), WorldCalls(server)):
+    for table in (actors, vehicles, lights, *others):
         server.calls |= calls_of(table)
     return server

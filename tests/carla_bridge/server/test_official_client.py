@@ -9,8 +9,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -23,9 +25,12 @@ PATIENCE = 900.0  # s
 pytestmark = pytest.mark.skipif(find_spec("carla") is None, reason="needs the wheel of CARLA's client")
 
 
+HOME = TemporaryDirectory()  # the client keeps files there
+
+
 def environment() -> dict[str, str]:
     path = os.pathsep.join((str(ROOT / "src"), str(ROOT), os.environ.get("PYTHONPATH", "")))
-    return {"HOME": str(ROOT), **os.environ, "PYTHONPATH": path}
+    return {**os.environ, "HOME": HOME.name, "PYTHONPATH": path}
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +50,16 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Pope
     assert "found a fault" not in said.read_text()
 
 
-def start(program: str, *arguments: str) -> subprocess.Popen[str]:
+@contextmanager
+def start(program: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A program as a process, which ends with the block."""
     command = [sys.executable, "-m", f"tests.carla_bridge.server.programs.{program}", str(PORT), *arguments]
-    return subprocess.Popen(
-        command, env=environment(), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, env=environment(), cwd=ROOT, stdout=pipe, stderr=pipe, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def run(program: str, *arguments: str) -> Any:
@@ -57,7 +67,8 @@ def run(program: str, *arguments: str) -> Any:
     with start(program, *arguments) as process:
         said, complaints = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, complaints
-    return json.loads(said) if said.strip().startswith("{") else said
+    *_, last = said.splitlines()
+    return json.loads(last) if last.startswith("{") else last
 
 
 def test_cameras_come_in_step_with_ticks_and_show_what_they_should(server: subprocess.Popen[bytes]) -> None:
@@ -91,7 +102,9 @@ def test_the_clients_traffic_manager_and_crowd_drive_and_walk(server: subprocess
 def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server: subprocess.Popen[bytes]) -> None:
     for k in range(5):
         with start("cameras") as process:
-            time.sleep(0.15 * (k + 1))
+            assert process.stdout is not None
+            assert process.stdout.readline() == "connected\n"
+            time.sleep(0.03 * k)
             process.kill()
     assert run("cameras")["moved"] > 1.0
 
@@ -99,7 +112,7 @@ def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server
 def test_a_client_whose_server_is_killed_is_told_so(server: subprocess.Popen[bytes]) -> None:  # the last test
     with start("bereft") as process:
         assert process.stdout is not None
-        assert process.stdout.readline() == "ticking\n"
+        assert [process.stdout.readline() for _ in range(2)] == ["connected\n", "ticking\n"]
         server.kill()
         said, complaints = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, complaints

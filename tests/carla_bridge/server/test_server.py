@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import socket
 import struct
 from collections.abc import Iterator
@@ -10,9 +11,16 @@ from collections.abc import Iterator
 import msgpack
 import pytest
 
+from caldrive.carla_bridge.axes import compose
+from caldrive.carla_bridge.server import clients
+from caldrive.carla_bridge.server.actors import Actor
+from caldrive.carla_bridge.server.layouts import Transform, placement
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.carla_bridge.server.vehicles import Vehicle
+from caldrive.carla_bridge.server.wire import Request
 from caldrive.commands.serve_carla import make_server
+from caldrive.datatypes import LightState
 from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, free_port, positions
 
 PORT = free_port()
@@ -72,13 +80,14 @@ def test_two_vehicles_do_not_stand_in_one_place(client: WireClient) -> None:
         client.spawn("vehicle.audi.tt", place(client, 0))
 
 
-def test_what_a_client_spawned_goes_with_it_and_so_does_synchronous_mode(server: Server, client: WireClient) -> None:
+def test_what_a_client_spawned_and_set_goes_with_it(server: Server, client: WireClient) -> None:
     other = WireClient(server)
     car = other.spawn("vehicle.tesla.model3", place(client, 0))
     other.synchronous(0.05)
+    assert client.call("get_episode_settings")[2] == [True, 0.05]
     other.leave()
     assert client.call("get_actors_by_id", [car]) == []
-    assert client.call("get_episode_settings")[0] is False
+    assert client.call("get_episode_settings")[:3] == [True, False, [True, 0.1]]  # its own
 
 
 def run_of_20_ticks(server: Server) -> list[bytes]:
@@ -146,6 +155,27 @@ def test_a_light_shows_what_a_client_wants_until_its_time_is_over(server: Server
     assert light.held is None
 
 
+def test_a_light_that_is_switched_off_leaves_the_others_of_its_junction_alone(
+    server: Server, client: WireClient
+) -> None:
+    first, second, *_ = server.episode.lights.of_junction(server.episode.lights.actors[0])
+    for light in (first, second):
+        client.call("set_traffic_light_state", light.id, 2)
+    client.call("set_traffic_light_state", first.id, 3)
+    assert (first.held, second.state) == (None, LightState.GREEN)
+    assert second.held is not None
+
+
+def test_every_sign_and_light_has_its_id_on_the_map(server: Server, client: WireClient) -> None:
+    on_map = set(re.findall(r'<signal [^>]*id="(\d+)"', client.call("get_map_data")))
+    signs = [one for one in server.episode.all(Actor) if one.kind.startswith("traffic.speed_limit")]
+    assert {one.sign for one in (*signs, *server.episode.lights.actors)} == on_map
+    for sign in signs:
+        middle = compose(sign.place, placement(Transform(sign.box.location)))
+        lane, s = server.episode.town.roads.lane_at(middle.pose)
+        assert math.hypot(lane.line.pose_at(s).x - middle.x, lane.line.pose_at(s).y - middle.y) < 2.5
+
+
 def test_all_lights_can_be_frozen_on_green(server: Server, client: WireClient) -> None:
     for light in server.episode.lights.actors:
         client.call("set_traffic_light_state", light.id, 2)
@@ -161,6 +191,12 @@ def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient)
     spawn = [[0, [[1, "vehicle.audi.tt", []], [[x, y, 0.3], [0.0, yaw, 0.0]], [False], 0, "", then]]]
     results = client.call("apply_batch", [spawn, spawn, [[1, [999_999]]], [[99, []]]], False)
     assert [result[0][0] for result in results] == [1, 0, 1, 0]
+    further = place(client, 2)
+    somewhere = [[further[0], further[1], 1.0], [0.0, 0.0, 0.0]]
+    walker = [[0, [[1, "walker.pedestrian.0001", []], somewhere, [False], 0, "", then]]]
+    ((done, who),) = client.call("apply_batch", [walker], False)[0]
+    assert done == 1  # it is there, though it does not drive
+    assert client.call("get_actors_by_id", [who])
     reader, car = Reader(client, WORLD), results[0][0][1]
     assert car not in positions(reader.message())  # it has not been told yet
     seen = []
@@ -170,9 +206,85 @@ def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient)
     assert seen[0] != seen[-1]
 
 
-def test_settings_that_cannot_be_are_refused(client: WireClient) -> None:
-    with pytest.raises(RefusedError, match="fixed_delta_seconds"):
-        client.synchronous(0.0)
+@pytest.mark.parametrize("fixed_delta", [[], [True], [True, 2.0], [True, -0.1], [2, -5.0], [True, float("nan")]])
+def test_settings_that_cannot_be_are_refused(client: WireClient, fixed_delta: list[object]) -> None:
+    with pytest.raises(RefusedError, match="fixed_delta"):
+        client.call("set_episode_settings", [True, False, fixed_delta])
+    client.call("tick_cue")
+
+
+def test_a_step_of_0_s_is_one_by_the_clock(client: WireClient) -> None:
+    client.call("set_episode_settings", [False, False, [True, 0.0]])
+    assert client.server.rules.delta is None
+
+
+def test_no_number_is_given_twice(client: WireClient) -> None:
+    first = client.spawn("vehicle.tesla.model3", place(client, 0))
+    client.call("load_new_episode", "", False, 0)
+    assert client.spawn("vehicle.tesla.model3", place(client, 0)) > first
+    assert not client.call("destroy_actor", first)
+
+
+def attached(client: WireClient, id: str, parent: int, **attributes: str) -> int:
+    """The number of a new actor 1 m ahead of another."""
+    rows = [[name, 4, value] for name, value in attributes.items()]
+    made = client.call("spawn_actor_with_parent", [1, id, rows], [[1, 0, 0], [0, 0, 0]], parent, 0, "")
+    return int(made[0])
+
+
+def test_a_long_row_of_attached_actors_is_refused(client: WireClient) -> None:
+    last = client.spawn("static.prop.box01", place(client, 0))
+    for _ in range(8):
+        last = attached(client, "static.prop.box01", last)
+    with pytest.raises(RefusedError, match="in a row"):
+        attached(client, "static.prop.box01", last)
+    client.call("tick_cue")
+
+
+def test_a_sensor_whose_attributes_cannot_be_is_refused_when_it_is_spawned(client: WireClient) -> None:
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
+    with pytest.raises(RefusedError, match="found distance '1000'"):
+        attached(client, "sensor.other.obstacle", car, distance="1000")
+
+
+def test_a_walker_that_is_attached_to_something_walks_where_it_is(server: Server, client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+    box = client.spawn("static.prop.box01", (x, y, yaw))
+    walker = server.episode.get(attached(client, "walker.pedestrian.0001", box))
+    assert walker is not None
+    assert math.hypot(walker.place.x - x, walker.place.y + y) == pytest.approx(1.0)
+
+
+def test_a_fault_of_a_sensor_is_told_once_and_silences_it(
+    server: Server, client: WireClient, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
+    sensor = attached(client, "sensor.other.imu", car)
+    Reader(client, sensor + 1)
+    monkeypatch.setitem(server._senses._say, "sensor.other.imu", lambda sensor, episode: iter([1 / 0]))
+    for _ in range(3):
+        client.call("tick_cue")
+    assert capsys.readouterr().err.count("found a fault in sensor.other.imu") == 1
+
+
+def test_a_client_that_reads_no_answers_is_cut_off_before_they_pile_up(
+    server: Server, client: WireClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served, serve = [], server.clients._serve
+
+    def counted(caller: int, request: Request) -> object:
+        served.append(request)
+        return serve(caller, request)
+
+    monkeypatch.setattr(clients, "MOST_UNREAD", 1_000_000)
+    monkeypatch.setattr(server.clients, "_serve", counted)
+    deaf = WireClient(server)
+    deaf.socket.send(b"".join(msgpack.packb([0, k, "get_actor_definitions", [[False]]]) for k in range(300)))
+    for _ in range(5):
+        server.turn(0.05)
+    assert 0 < len(served) < 300
+    deaf.leave()
+    assert client.call("version") == "0.9.16"
 
 
 def test_places_and_controls_that_are_no_numbers_do_no_harm(client: WireClient) -> None:
@@ -199,6 +311,9 @@ def test_a_vehicle_that_hits_a_standing_one_says_so(client: WireClient) -> None:
     client.call("apply_control_to_vehicle", car, control(throttle=1.0))
     for _ in range(40):
         client.call("tick_cue")
+    hit = client.server.episode.get(car)
+    assert isinstance(hit, Vehicle)
+    assert math.hypot(*hit.motion[0]) == pytest.approx(abs(hit.state.speed), abs=1e-6)  # as it is after the contact
     own, other, impulse = msgpack.unpackb(reader.message()[48:])
     assert (own[0], other[2][1]) == (car, "vehicle.carlamotors.firetruck")
     assert sum(part**2 for part in impulse) > 1000.0**2

@@ -6,6 +6,7 @@ import socket
 import struct
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 
@@ -13,7 +14,7 @@ from caldrive.carla_bridge.server import streams as module
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.streams import Streams
 
-STREAM, PORT = 5, 24660
+STREAM = 5
 MEGABYTE = bytes(1_000_000)
 
 
@@ -26,14 +27,15 @@ def said() -> list[str]:
 def streams(said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Streams]:
     monkeypatch.setattr(module, "MOST_WAITING", 20_000_000)
     monkeypatch.setattr(module, "PATIENCE", 0.2)
-    made = Streams(listening("127.0.0.1", PORT), said.append, newcomer=lambda stream: [b"first"])
+    monkeypatch.setattr(module, "STALLED", 0.2)
+    made = Streams(listening("127.0.0.1", 0), said.append, newcomer=lambda stream: [b"first"])
     yield made
     made.close()
 
 
 @pytest.fixture
 def reader(streams: Streams) -> Iterator[socket.socket]:
-    with socket.create_connection(("127.0.0.1", PORT)) as made:
+    with socket.create_connection(("127.0.0.1", streams.port)) as made:
         streams.announce(STREAM)
         made.send(struct.pack("<I", STREAM))
         streams.settle()
@@ -45,7 +47,7 @@ def test_a_subscriber_hears_the_latest_at_once(reader: socket.socket) -> None:
 
 
 def test_a_token_says_where_a_stream_is(streams: Streams) -> None:
-    assert struct.unpack("<IHBB16x", streams.token(STREAM)) == (STREAM, PORT, 1, 0)
+    assert struct.unpack("<IHBB16x", streams.token(STREAM)) == (STREAM, streams.port, 1, 0)
 
 
 def test_whoever_is_announced_and_does_not_come_is_waited_for_only_a_moment(streams: Streams) -> None:
@@ -62,10 +64,37 @@ def test_who_does_not_read_misses_messages_and_is_cut_off(
 ) -> None:
     for _ in range(40):
         streams.send(STREAM, [MEGABYTE])  # does not wait
-    assert [line for line in said if "misses messages" in line]
+    assert len(said) == 1
+    assert "misses messages" in said[0]
+    begin = time.monotonic()
     streams.settle()
+    assert time.monotonic() - begin < 0.1  # nobody waits for it any more
+    time.sleep(0.3)
+    streams.send(STREAM, [MEGABYTE])
     assert not streams.is_wanted(STREAM)
     assert "cut off" in said[-1]
+
+
+def test_whoever_reads_all_that_waited_gets_messages_again(
+    streams: Streams, reader: socket.socket, said: list[str]
+) -> None:
+    for _ in range(40):
+        streams.send(STREAM, [MEGABYTE])
+    reader.settimeout(0.05)
+    with suppress(TimeoutError):
+        while reader.recv(2**22):
+            streams.poll()
+    streams.send(STREAM, [b"news"])
+    assert reader.recv(100)[4:] == b"news"
+    assert len(said) == 1
+
+
+@pytest.mark.parametrize("words", [bytes(5), struct.pack("<II", 5, 5)])
+def test_who_says_more_than_a_number_harms_nobody(streams: Streams, words: bytes) -> None:
+    with socket.create_connection(("127.0.0.1", streams.port)) as talker:
+        talker.send(words)
+        for _ in range(3):
+            streams.poll(0.05)
 
 
 def test_who_reads_slowly_is_waited_for(streams: Streams, reader: socket.socket, said: list[str]) -> None:

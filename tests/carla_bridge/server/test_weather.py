@@ -14,9 +14,17 @@ from caldrive.world.scene.weather import WEATHERS
 @pytest.mark.parametrize("id", sorted(WEATHERS))
 def test_what_a_client_reads_of_a_weather_and_sets_again_is_that_weather(id: int) -> None:
     found = drawn(as_carla(WEATHERS[id]))
-    assert (found.cloudiness, found.precipitation, found.puddles, found.sun_altitude) == (
-        WEATHERS[id].cloudiness, WEATHERS[id].precipitation, WEATHERS[id].puddles, WEATHERS[id].sun_altitude,
-    )  # fmt: skip
+    assert found == WEATHERS[id]
+
+
+def test_fog_that_a_client_adds_is_drawn() -> None:
+    assert [drawn(Weather(fog_density=fog)).fog for fog in (0.0, 5.2, 34.0, 100.0, 200.0)] == [
+        2.0,
+        5.0,
+        30.0,
+        100.0,
+        100.0,
+    ]
 
 
 def test_carlas_own_clear_noon_is_ours() -> None:
@@ -31,4 +39,4 @@ def test_night_is_drawn_as_sunset_and_small_changes_are_not_drawn() -> None:
 def test_numbers_that_are_none_are_drawn_as_nothing() -> None:
     found = drawn(Weather(cloudiness=math.nan, precipitation=1e300, fog_density=math.inf))
     assert (found.cloudiness, found.precipitation) == (0.0, 100.0)
-    assert 0 <= found.fog <= 10
+    assert found.fog == 100.0

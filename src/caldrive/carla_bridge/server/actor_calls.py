@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from caldrive.carla_bridge.axes import Placement, compose
 from caldrive.carla_bridge.server.actors import Actor, ActorLayout, Prop, box_of
-from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, NOT_DRAWN, SIZES
+from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, REFUSED, SIZES
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.episode import PERSON_BOX
 from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox, Transform, Vector, placement
@@ -22,6 +22,7 @@ from caldrive.world.traffic.ego import EgoState
 
 OCCUPIED = "Spawn failed because of collision at spawn position"  # programs look for these words
 MOST_ACTORS = 1000  # that clients have spawned
+DEEPEST = 8  # actors that are attached to one another in a row
 FASTEST = 100.0  # m/s that a client may give an actor
 Kind = TypeVar("Kind", bound=Actor)
 
@@ -82,6 +83,8 @@ class ActorCalls:
         carrier = episode.get(parent) if parent else None
         if parent and carrier is None:
             raise Refusal(f"found no actor {parent} to attach {asked.id} to, wanted one that is there")
+        if carrier is not None and carrier.depth >= DEEPEST:
+            raise Refusal(f"found {DEEPEST} actors attached to each other in a row, wanted fewer: attach to the first")
         actor = self._made(asked, at, carrier)
         actor.id, actor.owner, actor.parent = episode.next_number(), caller, carrier
         if actor.stream:
@@ -92,7 +95,7 @@ class ActorCalls:
     def _made(self, asked: ActorDescription, at: Placement, carrier: Actor | None) -> Actor:
         """The actor, still without a number. Raises Refusal where it cannot be."""
         kind = asked.id
-        if kind.removeprefix("sensor.") in NOT_DRAWN:
+        if kind in REFUSED:
             raise Refusal(f"found {kind}, which caldrive does not simulate, wanted another sensor: see docs/carla.md")
         if kind.startswith("sensor."):
             streams = 0 if kind == "sensor.other.lane_invasion" else 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 from caldrive.carla_bridge.axes import Placement, compose
 from caldrive.carla_bridge.server.layouts import ActorDescription, AttributeValue, BoundingBox, Vector
@@ -11,10 +12,33 @@ from caldrive.carla_bridge.server.snapshot import NOTHING, Triple
 
 STILL: tuple[Triple, Triple, Triple] = (NOTHING, NOTHING, NOTHING)
 NOBODY = 0  # the owner of what is there from the beginning
-LABELS = {  # CARLA's semantic classes, by the beginning of an actor's id
-    "vehicle.": 14, "walker.": 12, "traffic.traffic_light": 7, "traffic.": 8, "static.": 20,
-}  # fmt: skip
 ActorLayout = tuple[int, int, ActorDescription, BoundingBox, bytes, bytes]
+
+
+class Label(IntEnum):
+    """CARLA's semantic classes, as far as there is something of them here."""
+
+    ROAD = 1
+    SIDEWALK = 2
+    BUILDING = 3
+    WALL = 4
+    FENCE = 5
+    POLE = 6
+    LIGHT = 7
+    SIGN = 8
+    VEGETATION = 9
+    TERRAIN = 10
+    SKY = 11
+    PEDESTRIAN = 12
+    CAR = 14
+    STATIC = 20
+    LINE = 24
+
+
+LABELS = {  # by the beginning of an actor's id
+    "vehicle.": Label.CAR, "walker.": Label.PEDESTRIAN, "traffic.traffic_light": Label.LIGHT, "traffic.": Label.SIGN,
+    "static.": Label.STATIC,
+}  # fmt: skip
 
 
 @dataclass(eq=False)
@@ -45,6 +69,11 @@ class Actor:
     def place(self) -> Placement:
         """Where it is."""
         return compose(self.parent.place, self.own_place) if self.parent else self.own_place
+
+    @property
+    def depth(self) -> int:
+        """How many actors it is attached to in a row."""
+        return self.parent.depth + 1 if self.parent else 0
 
     def put(self, place: Placement) -> None:
         """It is at a place from now on; as CARLA has it, that is relative for what is attached."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from caldrive.carla_bridge.server.actor_calls import ActorCalls
 from caldrive.carla_bridge.server.calls import arguments_of, call, converted
 from caldrive.carla_bridge.server.layouts import ActorDescription, Layout, Transform, placement
+from caldrive.carla_bridge.server.light_calls import LightCalls
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.vehicle_calls import VehicleCalls
 from caldrive.carla_bridge.server.wire import Refusal
@@ -30,7 +32,7 @@ class Spawn(Layout, frozen=True):
 class Batches:
     """They do what the single calls do."""
 
-    def __init__(self, server: Server, actors: ActorCalls, vehicles: VehicleCalls) -> None:
+    def __init__(self, server: Server, actors: ActorCalls, vehicles: VehicleCalls, lights: LightCalls) -> None:
         self._server, self._actors = server, actors
         self._commands: dict[int, tuple[Callable[..., Any], type[Any]]] = {}
         for number, method in (
@@ -38,7 +40,7 @@ class Batches:
             (5, vehicles.set_physics), (6, actors.set_transform), (8, actors.set_velocity), (9, actors.set_turning),
             (10, actors.add_impulse), (11, actors.add_force), (12, actors.turn), (13, actors.turn),
             (14, actors.simulate_physics), (15, actors.enable_gravity), (16, vehicles.autopilot),
-            (17, vehicles.debug_telemetry), (19, actors.set_location), (21, vehicles.set_light),
+            (17, vehicles.debug_telemetry), (19, actors.set_location), (21, lights.set_light),
         ):  # fmt: skip
             self._commands[number] = method, arguments_of(method)
         self._commands[7] = self._follow, tuple[int, Transform, float]
@@ -77,7 +79,8 @@ class Batches:
         parent = int(asked.parent[1]) if asked.parent[:1] == (True,) and len(asked.parent) > 1 else None
         actor = self._actors.spawn(caller, asked.description, placement(asked.transform), parent)
         for command in asked.then:
-            self._do(caller, command, actor.id, depth + 1)
+            with suppress(Refusal):  # the actor is there, and its client has to know
+                self._do(caller, command, actor.id, depth + 1)
         return actor.id
 
     def _follow(self, caller: int, number: int, at: Transform, speed: float) -> None:

@@ -78,8 +78,8 @@ PROPS = (
     ("static.prop.warningconstruction", 0.4, 1.2, 1.1), ("static.prop.trafficwarning", 2.8, 2.4, 3.5),
 )  # fmt: skip
 CAMERAS = ("rgb", "depth", "semantic_segmentation")
-NOT_DRAWN = ("camera.instance_segmentation", "camera.dvs", "camera.optical_flow", "camera.normals",
-             "lidar.ray_cast_semantic", "other.rss")  # fmt: skip
+NOT_DRAWN = ("instance_segmentation", "dvs", "optical_flow", "normals")
+REFUSED = (*(f"sensor.camera.{kind}" for kind in NOT_DRAWN), "sensor.lidar.ray_cast_semantic", "sensor.other.rss")
 _LENS = {
     "lens_circle_falloff": "5.0", "lens_circle_multiplier": "0.0", "lens_k": "-1.0", "lens_kcube": "0.0",
     "lens_x_size": "0.08", "lens_y_size": "0.08",
@@ -154,6 +154,11 @@ _SENSORS: dict[str, dict[str, str]] = {
     "sensor.other.imu": {
         f"noise_{what}_{axis}": "0.0" for what in ("accel_stddev", "gyro_stddev", "gyro_bias") for axis in "xyz"
     },
+    "sensor.lidar.ray_cast_semantic": {
+        "range": "10.0", "rotation_frequency": "10.0", "upper_fov": "10.0", "lower_fov": "-30.0",
+        "horizontal_fov": "360.0",
+    },
+    "sensor.other.rss": {},
     "sensor.lidar.ray_cast": {
         "range": "10.0", "rotation_frequency": "10.0", "upper_fov": "10.0", "lower_fov": "-30.0",
         "horizontal_fov": "360.0", "atmosphere_attenuation_rate": "0.004", "dropoff_general_rate": "0.45",
@@ -165,7 +170,7 @@ _SENSORS: dict[str, dict[str, str]] = {
 
 def _sensor(id: str) -> list[Attribute]:
     attributes = [*_names("front"), _free("sensor_tick", FLOAT, "0.0"), *_floats(_SENSORS[id])]
-    if id == "sensor.lidar.ray_cast":
+    if id.startswith("sensor.lidar."):
         attributes += [_free("channels", INT, "32"), _free("points_per_second", INT, "56000")]
     if id == "sensor.other.radar":
         attributes.append(_free("points_per_second", INT, "1500"))
@@ -183,9 +188,8 @@ def _all() -> dict[str, list[Attribute]]:
         found |= {f"vehicle.{name}": _vehicle(name, base, generation) for name, *_ in rows}
     found |= {f"walker.pedestrian.{k:04}": _walker(k) for k in range(1, N_WALKERS + 1)}
     found["controller.ai.walker"] = _names("default")
-    found |= {f"sensor.camera.{kind}": _camera(kind) for kind in CAMERAS}
+    found |= {f"sensor.camera.{kind}": _camera(kind) for kind in (*CAMERAS, *NOT_DRAWN)}
     found |= {id: _sensor(id) for id in _SENSORS}
-    found |= {f"sensor.{kind}": _camera("none") for kind in NOT_DRAWN}
     found |= {id: _names("prop") for id, *_ in PROPS}
     return found
 

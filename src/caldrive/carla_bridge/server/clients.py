@@ -73,8 +73,6 @@ class Clients:
                 client.outbox.flush()
             if events & selectors.EVENT_READ:
                 self._hear(client)
-            if client.outbox.waiting > MOST_UNREAD:
-                raise BrokenMessage("it does not read its answers")
             writes = selectors.EVENT_WRITE if client.outbox.waiting else 0
             self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
         except Gone:
@@ -94,6 +92,8 @@ class Clients:
             raise Gone
         for request in client.requests.feed(received):
             client.outbox.put([answer(request.id, self._serve(client.number, request))])
+            if client.outbox.waiting > MOST_UNREAD:
+                raise BrokenMessage("it does not read its answers")
 
     def _let_go(self, client: Client) -> None:
         self._selector.unregister(client.socket)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import count
 from typing import TypeVar
 
 import shapely
@@ -12,12 +11,15 @@ import shapely
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server import snapshot
 from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description
+from caldrive.carla_bridge.server.blueprints import N_WALKERS
 from caldrive.carla_bridge.server.contacts import Hit, is_free, resolve_contacts
 from caldrive.carla_bridge.server.layouts import BoundingBox, Vector, VehicleControl
 from caldrive.carla_bridge.server.layouts import Weather as CarlaWeather
 from caldrive.carla_bridge.server.lights import NUMBERS, Light, LightKeeper, light_actors
+from caldrive.carla_bridge.server.maps import SignalIds
 from caldrive.carla_bridge.server.population import Population
 from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.carla_bridge.server.signs import sign_actors
 from caldrive.carla_bridge.server.snapshot import NOTHING
 from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.carla_bridge.server.walkers import HEIGHT, RADIUS, UP, Walker
@@ -31,34 +33,29 @@ LOOK_AT_LIMITS = 10  # steps from one look at the limit under a vehicle to the n
 NATIVE_CARS = {4.2: "vehicle.seat.leon", 4.6: "vehicle.tesla.model3", 4.9: "vehicle.volkswagen.t2"}  # by their length
 NATIVE_HEIGHT = 1.5  # m
 PERSON_BOX = BoundingBox(Vector(), Vector(RADIUS, RADIUS, HEIGHT / 2))
-SIGN_BOX = BoundingBox(Vector(0.0, 0.0, 1.0), Vector(1.5, 1.5, 1.0))
 Kind = TypeVar("Kind", bound=Actor)
 
 
 class Episode:
-    """What is there, by number, and the time (s). signs: ids on the map, by those of their posts. Raises ValueError
-    where the town has no room for all inhabitants."""
+    """What is there, by number, and the time (s). ids: of lights and signs; numbers: for actors, which no
+    actor of another episode has. Raises ValueError where the town has no room for all inhabitants."""
 
-    def __init__(self, number: int, town: Town, settings: ServerSettings, signs: dict[str, str]) -> None:
+    def __init__(
+        self, number: int, town: Town, settings: ServerSettings, ids: SignalIds, numbers: Iterator[int]
+    ) -> None:
         self.number, self.town, self.time, self.delta = number, town, 0.0, 0.0
         self.hits: list[Hit] = []
-        self._steps, self._numbers = 0, count(1)
+        self._steps, self._numbers = 0, numbers
         self.set_weather(as_carla(weather(settings.weather)))
         self._population = Population(town.roads, settings.cars, settings.people, settings.seed)
         self.spectator = Actor(next(self._numbers), description("spectator"), Placement(z=50.0))
-        lights = light_actors(town.roads, self._numbers.__next__, signs)
+        lights, signs = light_actors(town.roads, numbers, ids.lights), sign_actors(town, numbers, ids.signs)
         self.lights = LightKeeper(lights, self._population.lights)
-        self._actors: dict[int, Actor] = {one.id: one for one in (self.spectator, *lights, *self._sign_actors())}
+        self._actors: dict[int, Actor] = {one.id: one for one in (self.spectator, *lights, *signs)}
         self._natives: dict[str, Actor] = {}
         self._at_light: dict[int, Light | None] = {}
         shapely.prepare(town.roads.roadway)
         self._take_down()
-
-    def _sign_actors(self) -> Iterator[Actor]:
-        for k, sign in enumerate(self.town.signs):
-            place = standing(sign.stands_at, 0.0)
-            what = description(f"traffic.speed_limit.{sign.limit}")
-            yield Actor(next(self._numbers), what, place, box=SIGN_BOX, sign=f"sign{k}")
 
     def set_weather(self, wanted: CarlaWeather) -> None:
         """The weather from now on."""
@@ -107,6 +104,7 @@ class Episode:
         """Moves everything on by delta seconds."""
         self.delta, self.time, self._steps = delta, self.time + delta, self._steps + 1
         vehicles, walkers = self.all(Vehicle), self.all(Walker)
+        before = [vehicle.state for vehicle in vehicles]
         for vehicle in vehicles:
             vehicle.step(delta)
         for walker in walkers:
@@ -114,6 +112,8 @@ class Episode:
         self._population.move_to(self.time, [one.box_state() for one in vehicles], self._walker_states())
         self._take_down()
         self.hits = resolve_contacts(vehicles, self.bodies(), self.all(Prop), self.town.obstacles)
+        for vehicle, state in zip(vehicles, before, strict=True):
+            vehicle.note_motion(state, delta)
         if self._steps % LOOK_AT_LIMITS == 1:
             for vehicle in vehicles:
                 vehicle.limit = self._limit_at(vehicle)
@@ -132,10 +132,10 @@ class Episode:
             actor = self._native(car, NATIVE_CARS.get(car.length, "vehicle.tesla.model3"))
             actor.own_place = standing(car.pose)
         for k, person in enumerate(self.people):
-            actor = self._native(person, f"walker.pedestrian.{1 + k % 30:04}")
+            actor = self._native(person, f"walker.pedestrian.{1 + k % N_WALKERS:04}")
             actor.own_place = standing(person.pose, UP)
         there = [*self.cars, *(one.box_state() for one in self.all(Vehicle))]
-        ids = [found.id for car in there if (found := self.actor_of(car.id)) is not None]
+        ids = [actor.id for actor in map(self.actor_of, (car.id for car in there)) if actor]
         self._at_light = dict(zip(ids, self.lights.before([car.pose for car in there]), strict=True))
 
     def _native(self, body: VehicleState | PedestrianState, kind: str) -> Actor:

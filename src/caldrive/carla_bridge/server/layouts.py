@@ -105,7 +105,10 @@ class Settings(Layout, frozen=True):
     @property
     def delta(self) -> float | None:
         """s of a step, None for a step that follows the clock."""
-        return float(self.fixed_delta[1]) if self.fixed_delta[0] and len(self.fixed_delta) > 1 else None
+        match self.fixed_delta:
+            case (True, float() | int() as seconds) if seconds:
+                return float(seconds)
+        return None
 
 
 class VehicleControl(Layout, frozen=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,8 +41,8 @@ class Light(Actor):
     """What a client wants it to show, and until when (s)."""
 
 
-def light_actors(roads: RoadNetwork, number: Callable[[], int], signs: dict[str, str]) -> list[Light]:
-    """The lights of a town. number: gives the next actor's; signs: their ids on the map, by those of their posts."""
+def light_actors(roads: RoadNetwork, numbers: Iterator[int], ids: dict[str, str]) -> list[Light]:
+    """The lights of a town. numbers: for actors; ids: on the map, by those of their posts."""
     counted: dict[str, int] = {}
     lights = []
     for post in roads.posts:
@@ -53,8 +53,8 @@ def light_actors(roads: RoadNetwork, number: Callable[[], int], signs: dict[str,
         at = to_local(facing, _point(moved(lane.line.pose_at(lane.line.length), forward=-TRIGGER))).tolist()
         box = BoundingBox(Vector(at[0], -at[1], 0.5), Vector(lane.width / 2, TRIGGER, 1.0))
         lights.append(
-            Light(number(), description("traffic.traffic_light"), standing(facing), box=box,
-                  sign=signs.get(post.id, post.id), post=post, number=k)
+            Light(next(numbers), description("traffic.traffic_light"), standing(facing), box=box,
+                  sign=ids.get(post.id, ""), post=post, number=k)
         )  # fmt: skip
     return lights
 
@@ -94,11 +94,11 @@ class LightKeeper:
         else:
             self._lights.frozen.discard(light.post.light)
 
-    def reset(self, light: Light, time: float) -> None:
-        """The lights of its junction do as they would alone."""
-        for one in self.of_junction(light):
-            one.held = None
-        self._pass_on(light.post.light)
+    def release(self, lights: Iterable[Light], time: float) -> None:
+        """Lights do as they would alone."""
+        for light in lights:
+            light.held = None
+            self._pass_on(light.post.light)
         self.update(time)
 
     def update(self, time: float) -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from caldrive.carla_bridge.axes import Placement, standing
 from caldrive.carla_bridge.server.wire import Refusal
+from caldrive.datatypes import Pose
 from caldrive.scenarios import TOWNS
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.opendrive import read_map
 from caldrive.world.roads.opendrive_roads import opendrive_roads
+from caldrive.world.roads.opendrive_signals import MapSign, edge_of
 from caldrive.world.roads.opendrive_writer import write_opendrive
 from caldrive.world.roads.written_signals import signals_of
 from caldrive.world.traffic.start_places import start_places
@@ -73,14 +77,31 @@ def spawn_points(roads: RoadNetwork) -> list[Placement]:
     return [standing(lane.line.pose_at(s), SPAWN_HEIGHT) for lane, s in start_places(roads)]
 
 
+@dataclass(frozen=True)
+class SignalIds:
+    """The ids that a town's signals have on its map."""
+
+    lights: dict[str, str]
+    """By the ids of their posts."""
+    signs: dict[tuple[Pose, int], str]
+    """By where they stand, and their limits in km/h."""
+
+
 @lru_cache(maxsize=2)
-def signal_ids(town: str, roads: RoadNetwork) -> dict[str, str]:
-    """The ids that a town's lights have on its map, by those of their posts."""
-    if town.endswith(".xodr"):
-        ids = read_map(Path(town).read_bytes()).signals.ids
-        # netconvert marks the lanes along the reference line of a road
-        edges = {f"-{road}" if forward else road: id for (road, forward), id in ids.items()}
-        found = {post.id: edges.get(roads.lanes[post.lane].edge.partition("#")[0]) for post in roads.posts}
-        return {post: id for post, id in found.items() if id}
-    signals = signals_of(roads, opendrive_roads(roads))
-    return {post.id: str(signal.id) for signal in signals for post in signal.posts}
+def signal_ids(town: str, roads: RoadNetwork) -> SignalIds:
+    """Those of a town's own file, or of the map that is written of it."""
+    if not town.endswith(".xodr"):
+        signals = signals_of(roads, opendrive_roads(roads))
+        lights = {post.id: signal.id for signal in signals for post in signal.posts}
+        return SignalIds(lights, {(one.foot, one.limit): one.id for one in signals if one.limit is not None})
+    found = read_map(Path(town).read_bytes()).signals
+    edges = {edge_of(approach): id for approach, id in found.ids.items()}
+    lights = {post.id: edges.get(roads.lanes[post.lane].edge.partition("#")[0], "") for post in roads.posts}
+    signs = {(sign.stands_at, sign.limit): _nearest(sign.stands_at, sign.limit, found.signs) for sign in roads.signs}
+    return SignalIds(lights, signs)
+
+
+def _nearest(foot: Pose, limit: int, signs: Iterable[MapSign]) -> str:
+    """The id of the map's sign that stands nearest to one of the town's, which may have been moved beside its lane."""
+    same = [sign for sign in signs if sign.limit == limit]
+    return min(same, key=lambda sign: math.hypot(foot.x - sign.foot.x, foot.y - sign.foot.y)).id if same else ""

@@ -25,7 +25,7 @@ class Outbox:
 
     def put(self, pieces: Sequence[Any]) -> None:
         """Sends pieces of bytes, or keeps what cannot be sent now. They must not change any more. Raises Gone."""
-        views = [memoryview(piece).cast("B") for piece in pieces]
+        views = [view for piece in pieces if (view := memoryview(piece).cast("B"))]  # none of them empty
         self._pieces.extend(views)
         self.waiting += sum(len(view) for view in views)
         self.flush()

@@ -11,10 +11,10 @@ import numpy as np
 
 from caldrive.carla_bridge.axes import Placement, to_carla
 from caldrive.carla_bridge.server import wire
-from caldrive.carla_bridge.server.actors import Actor, Prop, description
+from caldrive.carla_bridge.server.actors import Actor, Label, Prop, description
 from caldrive.carla_bridge.server.contacts import prop_box, way_ahead
 from caldrive.carla_bridge.server.episode import Episode
-from caldrive.carla_bridge.server.layouts import BoundingBox
+from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox
 from caldrive.carla_bridge.server.ranging import Rays, detections, lidar_settings, radar_settings, scan
 from caldrive.carla_bridge.server.snapshot import Sensor, header
 from caldrive.carla_bridge.server.wire import Refusal
@@ -30,12 +30,13 @@ GRAVITY = 9.81  # m/s²
 FARTHEST = 1000.0  # m that a depth image reaches
 DEPTH_STEPS = 256**3 - 1
 MOST_AREA = 2**22  # pixels of an image
-CITY_LABELS = {
-    Semantic.SKY: 11, Semantic.ROAD: 1, Semantic.LINE: 24, Semantic.SIDEWALK: 2, Semantic.GROUND: 10,
-    Semantic.BUILDING: 3, Semantic.PLANT: 9, Semantic.FURNITURE: 20, Semantic.LIGHT: 7, Semantic.SIGN: 8,
-    Semantic.VEHICLE: 14, Semantic.PERSON: 12,
+LABELS = {
+    Semantic.SKY: Label.SKY, Semantic.ROAD: Label.ROAD, Semantic.LINE: Label.LINE, Semantic.SIDEWALK: Label.SIDEWALK,
+    Semantic.GROUND: Label.TERRAIN, Semantic.BUILDING: Label.BUILDING, Semantic.PLANT: Label.VEGETATION,
+    Semantic.FURNITURE: Label.STATIC, Semantic.LIGHT: Label.LIGHT, Semantic.SIGN: Label.SIGN,
+    Semantic.VEHICLE: Label.CAR, Semantic.PERSON: Label.PEDESTRIAN,
 }  # fmt: skip
-_LABELS = np.array([CITY_LABELS[Semantic(k)] for k in range(len(Semantic))], np.uint8)
+_LABELS = np.array([LABELS[Semantic(k)] for k in range(len(Semantic))], np.uint8)
 Message = list[Any]  # pieces of bytes
 
 
@@ -53,6 +54,8 @@ class SensorActor(Actor):
     """Degrees."""
     angle: float = 0.0
     """Of a lidar's turn, rad."""
+    is_silent: bool = False
+    """Whether a fault has ended what it says."""
 
 
 def checked(sensor: SensorActor) -> SensorActor:
@@ -68,6 +71,8 @@ def checked(sensor: SensorActor) -> SensorActor:
         lidar_settings(asked)
     if sensor.kind == "sensor.other.radar":
         radar_settings(asked)
+    if sensor.kind == "sensor.other.obstacle":
+        _reach(asked)
     return sensor
 
 
@@ -203,12 +208,17 @@ def _other(name: str, episode: Episode) -> Any:
     actor = episode.actor_of(name)
     if actor is not None:
         return actor.layout(b"")
-    return 0, 0, description(f"static.{name.rstrip('0123456789')}"), BoundingBox(), b"\x14", b""
+    return 0, 0, description(f"static.{name.rstrip('0123456789')}"), BoundingBox(), bytes([Label.STATIC]), b""
+
+
+def _reach(asked: ActorDescription) -> tuple[float, float]:
+    """How far an obstacle sensor looks, and how far aside (m). Raises Refusal."""
+    return asked.number("distance", 5.0, 0.1, 500.0), asked.number("hit_radius", 0.5, 0.01, 50.0)
 
 
 def _obstacle(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
     asked, place = sensor.description, sensor.place
-    reach, radius = asked.number("distance", 5.0, 0.1, 500.0), asked.number("hit_radius", 0.5, 0.01, 50.0)
+    reach, radius = _reach(asked)
     own = sensor.parent.id if sensor.parent else 0
     scene = episode.scene(place, None)
     bodies: Sequence[Any] = (*scene.vehicles, *scene.pedestrians)

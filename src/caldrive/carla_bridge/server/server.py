@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, suppress
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from caldrive.carla_bridge.server import snapshot
@@ -42,8 +43,8 @@ class Server:
 
     def __init__(self, settings: ServerSettings, recording: RunRecording | None = None) -> None:
         self.settings, self.maps, self._recording = settings, Maps(settings.maps), recording
-        self.rules, self.rules_owner = Settings(), 0
-        self.frame, self._episodes = 0, 0
+        self._rules: dict[int, Settings] = {}  # of the clients that set some, the latest last
+        self.frame, self._episodes, self._numbers = 0, 0, count(1)
         self.managers: dict[int, tuple[str, int]] = {}
         """Traffic managers that clients run: port to host and owner."""
         self.calls: dict[str, Call] = {}
@@ -74,7 +75,7 @@ class Server:
         """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
         town = load_town(town_name)
         self._episodes += 1
-        episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads))
+        episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads), self._numbers)
         if self._senses.town is not town:
             self._senses.close()
             self._senses = Senses(town)
@@ -154,10 +155,12 @@ class Server:
         self.managers = {port: row for port, row in self.managers.items() if row[1] != client}
         if self.settings.keep:
             return
-        if self.rules_owner == client:
-            self.rules, self.rules_owner, self._next_step = Settings(), 0, time.monotonic()
+        if client in self._rules:
+            del self._rules[client]
+            self._next_step = time.monotonic()
         if not self.clients:  # who comes next finds what the first one found
-            self.rules, self.frame, self._episodes = Settings(), 0, 0
+            self.frame, self._episodes, self._numbers = 0, 0, count(1)
+            self._rules.clear()
             self._first_call = self._next_step = math.inf
             self.begin(self.settings.town)
             return
@@ -165,10 +168,20 @@ class Server:
             if actor.owner == client and self.episode.get(actor.id) is actor:
                 self.destroy(actor)
 
+    @property
+    def rules(self) -> Settings:
+        """The settings that a client has set last, of those who are there."""
+        return next(reversed(self._rules.values()), Settings())
+
     def set_rules(self, rules: Settings, owner: int) -> None:
         """Other settings from now on, of a client that they go with."""
-        self.rules, self.rules_owner = rules, owner
+        self._rules.pop(owner, None)
+        self._rules[owner] = rules
         self._next_step = max(self._next_step, time.monotonic())
+
+    def reset_rules(self) -> None:
+        """The usual settings."""
+        self._rules.clear()
 
     def sensors(self) -> list[SensorActor]:
         """Those that clients have spawned."""
@@ -189,21 +202,21 @@ class Server:
         self.streams.send(WORLD, self._latest)
         heard = []
         for sensor in self.sensors():
-            is_drawn = ".camera." in sensor.kind
-            if self.streams.is_wanted(sensor.stream) and not (is_drawn and self.rules.no_rendering):
+            is_off = sensor.is_silent or (self.rules.no_rendering and ".camera." in sensor.kind)
+            if self.streams.is_wanted(sensor.stream) and not is_off:
                 heard += [(sensor, message) for message in self._hear_sensor(sensor)]
         self._record(heard)
         return self.frame
 
     def _hear_sensor(self, sensor: SensorActor) -> list[Message]:
-        """Sends what a sensor says. A fault costs its stream."""
+        """Sends what a sensor says. A fault silences it."""
         try:
             messages = list(self._senses.messages(sensor, self.episode, self.frame))
             for message in messages:
                 self.streams.send(sensor.stream, message)
         except Exception as error:  # a place or a lens that nobody thought of
-            self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: its stream ends")
-            self.streams.close_stream(sensor.stream)
+            self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: it falls silent")
+            sensor.is_silent = True
             return []
         return messages
 

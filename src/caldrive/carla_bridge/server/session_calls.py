@@ -50,12 +50,11 @@ class SessionCalls:
     @call("set_episode_settings")
     def set_settings(self, caller: int, settings: Settings) -> int:
         """New settings; the caller answers for them from now on."""
-        if settings.fixed_delta[:1] == (True,) and not (
-            settings.delta is not None and 0.001 <= settings.delta <= LONGEST_STEP
-        ):
+        delta, is_free = settings.delta, settings.fixed_delta in ((False,), (True, 0))
+        if not is_free and not (delta is not None and 0.001 <= delta <= LONGEST_STEP):
             raise Refusal(
-                f"found fixed_delta_seconds {settings.delta}, wanted 0.001 to {LONGEST_STEP:g}: set "
-                "fixed_delta_seconds = 0.1"
+                f"found fixed_delta_seconds {delta}, wanted 0.001 to {LONGEST_STEP:g}, or 0 for steps by the clock: "
+                "set fixed_delta_seconds = 0.1"
             )
         self._server.set_rules(settings, caller)
         return self._server.frame
@@ -110,7 +109,7 @@ class SessionCalls:
         except (ValueError, OSError, RuntimeError) as error:
             raise Refusal(str(error)) from error
         if reset_settings:
-            self._server.set_rules(Settings(), 0)
+            self._server.reset_rules()
 
     @call("copy_opendrive_to_file")
     def copy_opendrive(self, caller: int, content: str, parameters: list[Any]) -> None:

@@ -19,17 +19,19 @@ from caldrive.carla_bridge.server.outbox import Gone, Log, Outbox, accepted
 WORLD = 1  # the stream of snapshots
 TOKEN = struct.Struct("<IHBB16x")
 TCP, SAME_HOST = 1, 0  # the protocol in a token; the address that a client has already
-MOST_WAITING = 32_000_000  # bytes that a subscriber may be behind
-PATIENCE = 1.0  # s that a subscriber may take for nothing, and that an announced one may take to come
+MOST_WAITING = 16_000_000  # bytes that a subscriber may be behind; the largest image may be more
+PATIENCE = 1.0  # s that the world waits for subscribers who are announced, and for those who are behind
+STALLED = 10.0  # s without reading anything after which a slow subscriber is cut off
 MOST_SUBSCRIBERS = 512
 
 
 class Subscriber:
-    """One connection. stream: what it reads, 0 until it has said so."""
+    """One connection. stream: what it reads, None until it has said so."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.socket, self.outbox = connection, Outbox(connection)
-        self.stream, self._said = 0, b""
+        self.stream: int | None = None
+        self._said = b""
 
     def hear(self) -> bool:
         """Whether it has said now which stream it wants. Raises Gone, as for anything that it says later."""
@@ -39,10 +41,10 @@ class Subscriber:
             return False
         except OSError as error:
             raise Gone from error
-        if not said or self.stream:
-            if said:
-                return False
+        if not said:
             raise Gone
+        if self.stream is not None:
+            return False
         self._said += said
         if len(self._said) < 4:
             return False
@@ -61,7 +63,7 @@ class Streams:
         self._subscribers: set[Subscriber] = set()
         self._by_stream: dict[int, list[Subscriber]] = {}
         self._announced: Counter[int] = Counter()
-        self._skipped: set[Subscriber] = set()
+        self._slow: dict[Subscriber, tuple[int, float]] = {}  # bytes that they are behind, and since when (s)
 
     def fileno(self) -> int:
         """For whoever waits until something happens here."""
@@ -82,12 +84,26 @@ class Streams:
     def send(self, stream: int, pieces: Sequence[Any]) -> None:
         """Sends a message to all who subscribe and keep up."""
         for subscriber in tuple(self._by_stream.get(stream, ())):
-            if subscriber.outbox.waiting > MOST_WAITING:
-                if subscriber not in self._skipped:
-                    self._log(f"somebody reads stream {stream} too slowly and misses messages")
-                self._skipped.add(subscriber)
-                continue
-            self._put(subscriber, pieces)
+            if self._keeps_up(subscriber):
+                self._put(subscriber, pieces)
+
+    def _keeps_up(self, subscriber: Subscriber) -> bool:
+        """Whether a subscriber is to get the next message. Who once was too slow has to read all that waits first."""
+        now, waiting = time.monotonic(), subscriber.outbox.waiting
+        if subscriber not in self._slow:
+            if waiting <= MOST_WAITING:
+                return True
+            self._log(f"somebody reads stream {subscriber.stream} too slowly and misses messages")
+            self._slow[subscriber] = waiting, now
+        elif waiting == 0:
+            del self._slow[subscriber]
+            return True
+        elif waiting < self._slow[subscriber][0]:
+            self._slow[subscriber] = waiting, now
+        elif now - self._slow[subscriber][1] > STALLED:
+            self._log(f"somebody who does not read stream {subscriber.stream} was cut off")
+            self._drop(subscriber)
+        return False
 
     def close_stream(self, stream: int) -> None:
         """Ends a stream."""
@@ -95,25 +111,15 @@ class Streams:
             self._drop(subscriber)
 
     def settle(self) -> None:
-        """Waits a moment for subscribers who are announced, and for those who have not read what was sent."""
+        """Waits a moment for subscribers who are announced, and for those who are behind; not for slow ones."""
         deadline = time.monotonic() + PATIENCE
-        while self._announced.total() and (left := deadline - time.monotonic()) > 0:
+        while (self._announced.total() or self._is_anybody_behind()) and (left := deadline - time.monotonic()) > 0:
             self.poll(left)
         self._announced.clear()
-        deadline, behind = time.monotonic() + PATIENCE, self._behind()
-        while behind and (left := deadline - time.monotonic()) > 0:
-            self.poll(left)
-            now = self._behind()
-            if now != behind:  # somebody reads
-                deadline = time.monotonic() + PATIENCE
-            behind = now
-        for subscriber in behind:
-            self._log(f"somebody who does not read stream {subscriber.stream} was cut off")
-            self._drop(subscriber)
 
-    def _behind(self) -> dict[Subscriber, int]:
-        """Who is so far behind that the next message might not reach them, and by how many bytes."""
-        return {one: one.outbox.waiting for one in self._subscribers if one.outbox.waiting > MOST_WAITING // 2}
+    def _is_anybody_behind(self) -> bool:
+        """So far that they would miss the next message."""
+        return any(one.outbox.waiting > MOST_WAITING and one not in self._slow for one in self._subscribers)
 
     def poll(self, patience: float = 0.0) -> None:
         """Lets in who comes, hears what they want, and sends on what waits."""
@@ -126,21 +132,21 @@ class Streams:
                     key.data.outbox.flush()
                     self._watch(key.data)
                 if events & selectors.EVENT_READ and key.data.hear():
-                    self._subscribe(key.data)
+                    self._subscribe(key.data, key.data.stream)
             except Gone:
                 self._drop(key.data)
 
     def _let_in(self) -> None:
         while (connection := accepted(self._waiting)) is not None:
             if len(self._subscribers) >= MOST_SUBSCRIBERS:
+                self._log(f"a subscriber was turned away, as there are {MOST_SUBSCRIBERS}")
                 connection.close()
                 continue
             subscriber = Subscriber(connection)
             self._subscribers.add(subscriber)
             self._selector.register(connection, selectors.EVENT_READ, subscriber)
 
-    def _subscribe(self, subscriber: Subscriber) -> None:
-        stream = subscriber.stream
+    def _subscribe(self, subscriber: Subscriber, stream: int) -> None:
         self._by_stream.setdefault(stream, []).append(subscriber)
         self._announced[stream] -= 1
         if self._announced[stream] <= 0:
@@ -168,9 +174,12 @@ class Streams:
         if subscriber not in self._subscribers:
             return
         self._subscribers.discard(subscriber)
-        self._skipped.discard(subscriber)
-        if subscriber in self._by_stream.get(subscriber.stream, ()):
-            self._by_stream[subscriber.stream].remove(subscriber)
+        self._slow.pop(subscriber, None)
+        stream = subscriber.stream
+        if stream is not None and subscriber in self._by_stream.get(stream, ()):
+            self._by_stream[stream].remove(subscriber)
+            if not self._by_stream[stream]:
+                del self._by_stream[stream]
         self._selector.unregister(subscriber.socket)
         subscriber.socket.close()
 

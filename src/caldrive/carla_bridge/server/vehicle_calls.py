@@ -1,4 +1,4 @@
-"""The calls about vehicles, walkers and traffic lights."""
+"""The calls about vehicles and walkers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.layouts import (
     AckermannControl,
     AckermannSettings,
-    BoundingBox,
     PhysicsControl,
     Transform,
     Vector,
@@ -20,13 +19,10 @@ from caldrive.carla_bridge.server.layouts import (
     WalkerControl,
     placement,
 )
-from caldrive.carla_bridge.server.lights import OFF, STATES, Light
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.vehicles import Vehicle, physics_of, set_physics
 from caldrive.carla_bridge.server.walkers import FASTEST, Walker
 from caldrive.carla_bridge.server.wire import Refusal
-
-MOST_TIME = 1e6  # s that a light may show the same
 
 
 class VehicleCalls:
@@ -37,9 +33,6 @@ class VehicleCalls:
 
     def _vehicle(self, number: int) -> Vehicle:
         return self._actors.find(number, Vehicle)
-
-    def _light(self, number: int) -> Light:
-        return self._actors.find(number, Light)
 
     @call("apply_control_to_vehicle")
     def control(self, caller: int, number: int, control: VehicleControl) -> None:
@@ -159,69 +152,6 @@ class VehicleCalls:
     @call("get_pose_from_animation")
     def pose_from_animation(self, caller: int, number: int) -> None:
         """Likewise."""
-
-    @call("set_traffic_light_state")
-    def set_light(self, caller: int, number: int, state: int) -> None:
-        """It shows that as long as it lasts; a light that is off, or unknown, does as it would alone."""
-        light, keeper, time = self._light(number), self._server.episode.lights, self._server.episode.time
-        if state >= OFF:
-            keeper.reset(light, time)
-        elif state in STATES:
-            keeper.hold(light, STATES[state], time)
-
-    def _set_time(self, number: int, place: int, seconds: float) -> None:
-        light = self._light(number)
-        times = list(light.times)
-        times[place] = max(0.0, finite(seconds, MOST_TIME))
-        light.times = (times[0], times[1], times[2])
-
-    @call("set_traffic_light_green_time")
-    def set_green(self, caller: int, number: int, seconds: float) -> None:
-        """How long a green that a client asked for lasts."""
-        self._set_time(number, 0, seconds)
-
-    @call("set_traffic_light_yellow_time")
-    def set_yellow(self, caller: int, number: int, seconds: float) -> None:
-        """Likewise."""
-        self._set_time(number, 1, seconds)
-
-    @call("set_traffic_light_red_time")
-    def set_red(self, caller: int, number: int, seconds: float) -> None:
-        """Likewise."""
-        self._set_time(number, 2, seconds)
-
-    @call("freeze_traffic_light")
-    def freeze(self, caller: int, number: int, is_frozen: bool) -> None:
-        """The lights of its junction stay as they are."""
-        self._server.episode.lights.freeze(self._light(number), is_frozen)
-
-    @call("freeze_all_traffic_lights")
-    def freeze_all(self, caller: int, is_frozen: bool) -> None:
-        """All lights stay as they are."""
-        for light in self._server.episode.lights.actors:
-            self._server.episode.lights.freeze(light, is_frozen)
-
-    @call("reset_traffic_light_group")
-    def reset(self, caller: int, number: int) -> None:
-        """The lights of a junction do as they would alone."""
-        self._server.episode.lights.reset(self._light(number), self._server.episode.time)
-
-    @call("reset_all_traffic_lights")
-    def reset_all(self, caller: int) -> None:
-        """Likewise all of them."""
-        for light in self._server.episode.lights.actors:
-            self._server.episode.lights.reset(light, self._server.episode.time)
-
-    @call("get_group_traffic_lights")
-    def group(self, caller: int, number: int) -> list[int]:
-        """The lights of its junction, with itself."""
-        return [one.id for one in self._server.episode.lights.of_junction(self._light(number))]
-
-    @call("get_light_boxes")
-    def light_boxes(self, caller: int, number: int) -> list[BoundingBox]:
-        """The box of its lamps, in the world."""
-        at = self._light(number).place
-        return [BoundingBox(Vector(at.x, -at.y, 3.0), Vector(0.2, 0.2, 0.5))]
 
     def _refuse_model(self) -> None:
         """Raises Refusal: there is one model of a vehicle."""

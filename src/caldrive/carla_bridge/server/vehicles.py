@@ -78,7 +78,6 @@ class Vehicle(Actor):
         speed = self.state.speed + self.pushed / self.physics.mass * dt
         self.pushed = 0.0
         self.state = replace(self.state, speed=speed if self.constant_speed is None else self.constant_speed)
-        self.note_motion(before, dt)
 
     def note_motion(self, before: EgoState, dt: float) -> None:
         """Takes down how it moves, from where it was dt seconds ago."""

@@ -26,6 +26,11 @@ class Walker(Actor):
     before: Pose = field(default=Pose(0.0, 0.0, 0.0))
     """Where they were at the last step."""
 
+    @property
+    def place(self) -> Placement:
+        """Where they are: they walk by themselves, whatever they are attached to."""
+        return self.own_place
+
     def step(self, dt: float) -> None:
         """Walks on for dt seconds."""
         at, control = self.own_place, self.control

@@ -10,30 +10,24 @@ from caldrive.carla_bridge.server.layouts import Weather as CarlaWeather
 from caldrive.world.scene.weather import NOON, SUNSET, WEATHERS, Weather
 
 STEP = 10.0  # percent, and degrees / 2: what is drawn changes in such steps, as every sky has to be painted
-THICKEST = 10.0  # of the haze, which CARLA counts to 100
+THINNEST, THICKEST = 2.0, 100.0  # percent of fog that is drawn; CARLA's own weathers have 2 to 7
 WET = 0.5  # of the standing water that makes a road as wet
 
 
 def drawn(wanted: CarlaWeather) -> Weather:
     """The weather that is drawn for one that a client asks for; exactly one of CARLA's where it is one of them."""
     puddles = max(wanted.precipitation_deposits, WET * wanted.wetness)
-    numbers = (
-        _share(wanted.cloudiness), _share(wanted.precipitation), _share(puddles),
-        min(max(_stepped(wanted.sun_altitude, STEP / 2), SUNSET), NOON),
-    )  # fmt: skip
-    for known in WEATHERS.values():
-        if numbers == (
-            _share(known.cloudiness),
-            _share(known.precipitation),
-            _share(known.puddles),
-            known.sun_altitude,
-        ):
-            return known
-    fog = min(max(_stepped(wanted.fog_density / 10, 1.0), 2.0), THICKEST)
-    clouds, rain, water, sun = numbers
-    return Weather(
-        id=0, name="of a client", cloudiness=clouds, precipitation=rain, puddles=water, sun_altitude=sun, fog=fog
-    )
+    clouds, rain, water = map(_share, (wanted.cloudiness, wanted.precipitation, puddles))
+    sun = min(max(_stepped(wanted.sun_altitude, STEP / 2), SUNSET), NOON)
+    fog = min(max(_stepped(wanted.fog_density, 1.0 if wanted.fog_density < STEP else STEP), THINNEST), THICKEST)
+    found = Weather(0, "of a client", cloudiness=clouds, precipitation=rain, puddles=water, sun_altitude=sun, fog=fog)
+    return next((known for known in WEATHERS.values() if _numbers(known) == _numbers(found)), found)
+
+
+def _numbers(weather: Weather) -> tuple[float, ...]:
+    """In the steps in which weathers are told apart."""
+    shares = map(_share, (weather.cloudiness, weather.precipitation, weather.puddles))
+    return *shares, weather.sun_altitude, weather.fog
 
 
 def as_carla(weather: Weather) -> CarlaWeather:

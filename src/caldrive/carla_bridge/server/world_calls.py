@@ -7,7 +7,7 @@ from typing import Any
 
 import shapely
 
-from caldrive.carla_bridge.server.actors import LABELS
+from caldrive.carla_bridge.server.actors import Label
 from caldrive.carla_bridge.server.calls import Call, call
 from caldrive.carla_bridge.server.episode import NATIVE_HEIGHT
 from caldrive.carla_bridge.server.layouts import BoundingBox, Rotation, Transform, Vector
@@ -17,8 +17,10 @@ from caldrive.datatypes import Pose, VehicleState
 from caldrive.world.scene.scenery import Prop
 
 ANY = 255  # the label of everything
-PROP_LABELS = {"building": 3, "wall": 4, "fence": 5, "lamp": 6, "light_post": 7, "sign_post": 8, "tree": 9, "hedge": 9}
-STATIC = 20  # the label of other things
+PROP_LABELS = {
+    "building": Label.BUILDING, "wall": Label.WALL, "fence": Label.FENCE, "lamp": Label.POLE, "light_post": Label.LIGHT,
+    "sign_post": Label.SIGN, "tree": Label.VEGETATION, "hedge": Label.VEGETATION,
+}  # fmt: skip
 IGNORED: dict[str, Any] = {  # what they give; clients wait for some of them
     **dict.fromkeys((
         "draw_debug_shape", "clear_debug_shape", "clear_debug_string", "update_lights_state",
@@ -56,7 +58,7 @@ class WorldCalls:
         """Boxes in the world of what has a semantic label."""
         episode = self._server.episode
         found = [_box(prop) for prop in episode.town.scenery if label in (ANY, _label(prop))]
-        if label in (ANY, LABELS["vehicle."]):
+        if label in (ANY, Label.CAR):
             found += [_vehicle_box(car) for car in episode.cars]
         return found
 
@@ -91,11 +93,11 @@ class WorldCalls:
         return [point] if meets else []
 
     def _ground(self, x: float, y: float) -> int:
-        return 1 if shapely.contains_xy(self._server.episode.town.roads.roadway, x, -y) else 2
+        return Label.ROAD if shapely.contains_xy(self._server.episode.town.roads.roadway, x, -y) else Label.SIDEWALK
 
 
 def _label(prop: Prop) -> int:
-    return PROP_LABELS.get(prop.kind, STATIC)
+    return PROP_LABELS.get(prop.kind, Label.STATIC)
 
 
 def _in_world(pose: Pose, length: float, width: float, height: float) -> BoundingBox:

@@ -18,7 +18,7 @@ from caldrive.datatypes import Pose, Sign
 from caldrive.geometry import moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, LightPost, RoadNetwork, lane_area
 from caldrive.world.roads.opendrive_repairs import Dropped
-from caldrive.world.roads.opendrive_signals import Approach, MapSign, Signals
+from caldrive.world.roads.opendrive_signals import Approach, MapSign, Signals, edge_of
 
 NEAR_LINE, BESIDE_KERB = 5.0, (0.3, 5.0)  # m from a stop line, and right of the road's edge, where a light is seen
 ASIDE = 12.0  # m right of the edge of a road up to which a sign stands
@@ -51,9 +51,8 @@ class _Places:
         self.areas = shapely.STRtree([lane_area(lane.line, lane.width + 2 * CLEAR) for lane in roads.lanes.values()])
 
     def _lanes_of(self, approach: Approach) -> list[Lane]:
-        """The lanes of a road in one direction, the outermost first; netconvert marks those along its line."""
-        road, forward = approach
-        return self.by_road.get(f"-{road}" if forward else road, [])
+        """The lanes of a road in one direction, the outermost first."""
+        return self.by_road.get(edge_of(approach), [])
 
     def posts(self, approach: Approach, feet: Sequence[Pose]) -> Iterator[LightPost]:
         """The lights of the lanes that lead into a junction. feet: where lights for them stand on the map."""

@@ -26,6 +26,12 @@ BEYOND = 0.5  # m past the end of a road where a sign still stands on it
 Approach = tuple[str, bool]  # a road, and whether its traffic along the reference line is meant, or that against it
 
 
+def edge_of(approach: Approach) -> str:
+    """What netconvert calls the lanes of a road in one direction; it marks those along the reference line."""
+    road, forward = approach
+    return f"-{road}" if forward else road
+
+
 @dataclass(frozen=True)
 class MapSign:
     """A speed sign of a map."""
@@ -38,6 +44,8 @@ class MapSign:
     """Where it stands."""
     limit: int
     """km/h, one of SPEED_SIGNS."""
+    id: str = ""
+    """The map's own."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +146,7 @@ class _Reader:
             self.dropped[f"speed signs without a limit of {SPEED_SIGNS[0]} km/h or more"] += 1
             return
         approach, at, foot = self._place(road, thing)
-        self.signs[round(foot.x), round(foot.y), shown] = MapSign(approach, at, foot, shown)
+        self.signs[round(foot.x), round(foot.y), shown] = MapSign(approach, at, foot, shown, thing.get("id") or "")
 
     def _read_light(self, road: ET.Element, thing: ET.Element) -> None:
         approaches = self.references.get(thing.get("id") or "") or self._approaches(road, thing)

@@ -56,6 +56,10 @@ def look_at_the_map(world: carla.World, town: carla.Map) -> None:
         turned = math.radians(waypoint.transform.rotation.yaw - point.rotation.yaw)
         assert math.cos(turned) > 0.9
     assert world.get_actors().filter("traffic.speed_limit*")
+    signs = town.get_all_landmarks_of_type("274")
+    assert signs
+    assert all(world.get_traffic_sign(sign) is not None for sign in signs)
+    assert all(world.get_traffic_light(light) is not None for light in town.get_all_landmarks_of_type("1000001"))
 
 
 def drive(world: carla.World, car: carla.Vehicle) -> None:

@@ -22,9 +22,11 @@ def run(main: Callable[[], None]) -> None:
 
 
 def connect() -> Any:
-    """A client of the server whose port is the first argument."""
+    """A client of the server whose port is the first argument; says when it is connected."""
     client = carla.Client("127.0.0.1", int(sys.argv[1]), 8)
     client.set_timeout(PATIENCE)
+    client.get_server_version()
+    print("connected", flush=True)
     return client
 
 
