@@ -67,6 +67,8 @@ def test_a_car_alone_ahead_decides_how_far_it_is() -> None:
     assert subject("car ahead", vehicles=(ahead, beyond), vehicle_distance=11.0) is None
     near = (car(6.0, 0.0, "c"),)
     assert subject("hazard by a car", vehicles=near, hazard_stop=1.0) == ("c", None)
+    aside = (car(7.0, 1.8, "c"),)  # where a hazard is, and yet not a car ahead
+    assert subject("hazard by a car", vehicles=aside, hazard_stop=1.0) == ("c", None)
     assert subject("hazard by a car", vehicles=near) is None  # a car that is not on the way
 
 

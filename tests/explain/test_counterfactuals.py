@@ -53,16 +53,20 @@ def test_an_effect_is_the_mean_over_cases_with_the_answers_that_flip() -> None:
     assert (effect.cases, effect.episodes, effect.flipped, effect.flipped_now) == (2, 2, 1, 1)
     assert (effect.before, effect.after, effect.difference) == pytest.approx((0.8, 0.35, -0.45))
     assert effect.difference_now == pytest.approx(-0.3)
-    low, high = effect.interval
-    assert (low, high) == pytest.approx((-0.8, -0.1))
+    assert effect.interval is None  # two episodes say nothing of others
+    (effect,) = effects([changed(k, 0.9, 0.1 + 0.1 * (k % 2), 0.8) for k in range(6)])
+    assert effect.interval is not None
+    assert -0.8 <= effect.interval[0] < effect.difference < effect.interval[1] <= -0.7
 
 
 def test_an_interval_is_wider_where_episodes_differ_than_where_cases_do() -> None:
     values = [0.0, 1.0] * 20
     by_case = [(k // 4, value) for k, value in enumerate(values)]
     by_episode = [(k % 10, value) for k, value in enumerate(values)]  # all of one episode are alike
-    assert interval([(0, 0.3), (1, 0.3)], 0) == pytest.approx((0.3, 0.3))
+    assert interval([(k, 0.3) for k in range(5)], 0) == pytest.approx((0.3, 0.3))
+    assert interval([(k, 0.3) for k in range(4)], 0) is None
     narrow, wide = interval(by_case, 0), interval(by_episode, 0)
+    assert wide is not None
     assert narrow == pytest.approx((0.5, 0.5))
     assert wide[0] < 0.3
     assert wide[1] > 0.7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -47,8 +48,48 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 def test_the_first_trial_is_the_controller_as_it_is(quick: list[float], tmp_path: Path) -> None:
     tune(replace(RIGHT, trials=1), DEFAULT, tmp_path)
     assert quick[0] == DEFAULT.longitudinal.turn_speed
-    tune(replace(RIGHT, trials=1), PAPER, tmp_path / "paper")  # which has no such limit: the range's end
-    assert quick[-3] == 45.0
+    tune(replace(RIGHT, trials=1), PAPER, tmp_path / "paper")  # which has no such limit
+    assert set(quick[1:]) == {15.0, math.inf}
+    assert quick[3] == math.inf
+
+
+def test_a_kill_in_the_first_trial_does_not_lose_the_controller_as_it_is(quick: list[float], tmp_path: Path) -> None:
+    study = auto.open_study(tmp_path, RIGHT)
+    study.ask().set_user_attr(auto.NUMBER, 0)
+    tune(RIGHT, DEFAULT, tmp_path)
+    assert quick[0] == DEFAULT.longitudinal.turn_speed
+
+
+def test_a_trial_that_was_done_twice_counts_once(quick: list[float], tmp_path: Path) -> None:
+    for _ in range(2):
+        run_trial(tmp_path, RIGHT, DEFAULT, 0)
+    assert missing_trials(tmp_path, RIGHT) == [1, 2]
+    assert tune(RIGHT, DEFAULT, tmp_path).trials == 3
+
+
+def test_a_trial_is_pruned_by_its_mean_so_far_and_not_by_its_best(tmp_path: Path) -> None:
+    study = auto.open_study(tmp_path, RIGHT)
+    for _ in range(auto.STARTUP_TRIALS):
+        assert not auto.is_worse(study, 1, 9.0)
+        trial = study.ask()
+        for step, mean in enumerate((0.9, 0.8)):
+            trial.report(mean, step)
+        study.tell(trial, 0.8)
+    assert not auto.is_worse(study, 0, 0.9)
+    assert auto.is_worse(study, 1, 0.85)  # whatever it was before
+
+
+def test_a_killed_process_does_not_lock_the_trials_in_a_folder_named_from_here(
+    quick: list[float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tune(RIGHT, DEFAULT, Path("out"))
+    lock = tmp_path / "out" / "journal.log.lock"
+    study = auto.open_study(Path("out"), RIGHT)
+    backend = study._storage._backend._lock
+    assert backend.acquire()
+    assert lock.resolve() == tmp_path / "out" / "journal.log"  # not a link to nowhere
+    backend.release()
 
 
 def test_a_search_finds_what_costs_less(quick: list[float], tmp_path: Path) -> None:
@@ -71,7 +112,7 @@ def test_a_search_that_was_stopped_goes_on(quick: list[float], tmp_path: Path) -
     expected = quick[:6]
     quick.clear()
     parts.mkdir()
-    missing_trials(parts, RIGHT, DEFAULT)
+    missing_trials(parts, RIGHT)
     run_trial(parts, RIGHT, DEFAULT, 0)
     tune(replace(RIGHT, trials=6), DEFAULT, parts)
     assert quick[:6] == expected

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -81,9 +82,11 @@ def address(tmp_path: Path) -> Iterator[str]:
                     break
             time.sleep(0.1)
         yield f"http://{HOST}:{port}"
+        process.send_signal(signal.SIGINT)  # Ctrl-C is its usual end
+        assert process.wait(PATIENCE) == 0
     finally:
-        process.terminate()
-        process.wait(PATIENCE)
+        process.kill()
+        process.wait()
 
 
 @pytest.fixture

@@ -71,10 +71,9 @@ def _effect_table(effects: Sequence[Effect]) -> Table:
     table = Table(*heads, box=SIMPLE_HEAD)
     for one in effects:
         change = f"{one.change} (control)" if one.control else one.change
-        low, high = one.interval
         table.add_row(
             one.situation, change, str(one.cases), f"{one.before:.2f}", f"{one.after:.2f}",
-            f"{one.difference:+.2f} ({low:+.2f} to {high:+.2f})", f"{one.flipped}/{one.cases}",
+            f"{one.difference:+.2f}{_interval(one.interval, 2)}", f"{one.flipped}/{one.cases}",
             f"{one.difference_now:+.2f} {one.flipped_now}/{one.cases}", style="dim" if one.control else "",
         )  # fmt: skip
     return table
@@ -83,9 +82,11 @@ def _effect_table(effects: Sequence[Effect]) -> Table:
 def _finding_table(findings: Sequence[Finding]) -> Table:
     table = Table("the paper's observations", "cases", "value", "verdict", box=SIMPLE_HEAD)
     for one in findings:
-        value = "-"
-        if one.value is not None and one.interval is not None:
-            low, high = one.interval
-            value = f"{one.value:+.3f} ({low:+.3f} to {high:+.3f})"
+        value = "-" if one.value is None else f"{one.value:+.3f}{_interval(one.interval, 3)}"
         table.add_row(one.statement, str(one.cases), value, one.verdict)
     return table
+
+
+def _interval(interval: tuple[float, float] | None, digits: int) -> str:
+    """An interval in brackets, nothing for none."""
+    return "" if interval is None else " ({0:+.{2}f} to {1:+.{2}f})".format(*interval, digits)

@@ -51,7 +51,13 @@ class Tune(Configurable):
 
         require_nicegui()
         require_free_port(self.port)
+        before = _saved_at(path)
         print(f"tuning: http://{HOST}:{self.port} (Ctrl-C ends it)", file=sys.stderr, flush=True)
         serve(controller, path, self.port)
-        saved = path if path.is_file() else None
+        saved = path if _saved_at(path) != before else None
         return Answer({"controller": saved and str(saved)}, f"saved: {saved}" if saved else "nothing was saved")
+
+
+def _saved_at(path: Path) -> int | None:
+    """When a file was written, in ns; None where there is none."""
+    return path.stat().st_mtime_ns if path.is_file() else None

@@ -138,7 +138,8 @@ def _car_in_the_way(moment: Moment) -> Subject | None:
     truth, (people, cars) = moment.truth, moment.in_the_way()
     if people or len(cars) != 1 or not truth.affordances.hazard_stop:
         return None
-    return cars[0].id, moment.beside(truth.vehicles, [car for _, car in A3.among(moment.axle, truth.vehicles)])
+    of_concern = [*cars, *(car for _, car in A3.among(moment.axle, truth.vehicles))]  # the areas differ in width
+    return cars[0].id, moment.beside(truth.vehicles, of_concern)
 
 
 def _car_ahead(moment: Moment) -> Subject | None:

@@ -4,6 +4,7 @@ sheet of pictures."""
 from __future__ import annotations
 
 import io
+import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
@@ -105,10 +106,11 @@ def study(
 def _seen(
     network: Network, scenarios: Sequence[Scenario], *, cases: int, layer: str, seed: int, progress: Progress
 ) -> Iterator[Seen]:
-    """The cases of all episodes as the network sees them, up to so many of each situation."""
+    """The cases of all episodes as the network sees them, up to so many of each situation, and of each episode its
+    share of these: what happens in one belongs together."""
     world, agent = set_up(AgentSettings(agent="oracle"))
     assert isinstance(world, EmbeddedWorld)
-    counts = Counter[str]()
+    most = math.ceil(cases / len(scenarios))
     with closing(world), closing(CameraRig(load_town(scenarios[0].town))) as rig:
         studio = Studio(rig, network, layer)
         for episode, scenario in enumerate(scenarios):
@@ -117,9 +119,10 @@ def _seen(
             found = find_cases(
                 world, agent, there, episode=episode, span=network.span, seed=seed, progress=driving
             )  # fmt: skip
+            counts = Counter[str]()
             for k, case in enumerate(found):
                 drawing("drawing", k / len(found))
-                if counts[case.situation.name] < cases:
+                if counts[case.situation.name] < most:
                     counts[case.situation.name] += 1
                     yield see(studio, case)
 

@@ -23,6 +23,7 @@ from caldrive.perception.network.network import Network
 from caldrive.world.rendering.camera import CameraRig
 
 DIFFERENT = 8  # grey levels from which on a pixel is seen to be another
+FEWEST_EPISODES = 5  # of which an interval says anything
 FEWEST_PIXELS = 8  # that have to change for a thing to be seen at all: a lamp is small
 RESAMPLES, LOW, HIGH = 2000, 2.5, 97.5  # of the bootstrap, and the percentiles of its interval
 Values = Sequence[tuple[int, float]]  # of cases, each with its episode
@@ -151,9 +152,12 @@ def says(case: Case, reply: Reply) -> bool:
     return reply.probability >= 0.5
 
 
-def interval(values: Values, seed: int) -> tuple[float, float]:
-    """The bootstrap's 95 % interval of a mean, where whole episodes are drawn: what happens in one belongs together."""
+def interval(values: Values, seed: int) -> tuple[float, float] | None:
+    """The bootstrap's 95 % interval of a mean, where whole episodes are drawn: what happens in one belongs together.
+    None for so few episodes that it would say nothing."""
     episodes = sorted({episode for episode, _ in values})
+    if len(episodes) < FEWEST_EPISODES:
+        return None
     sums = np.array([sum(value for one, value in values if one == episode) for episode in episodes])
     sizes = np.array([sum(one == episode for one, _ in values) for episode in episodes])
     drawn = np.random.default_rng(seed).integers(len(episodes), size=(RESAMPLES, len(episodes)))
@@ -176,8 +180,8 @@ class Effect:
     after: float
     """With the change in all frames that the network looks at."""
     difference: float
-    interval: tuple[float, float]
-    """Of the difference, 95 %."""
+    interval: tuple[float, float] | None
+    """Of the difference, 95 %; None for too few episodes."""
     flipped: int
     """Cases in which the answer is another one: yes or no, or the number on a sign."""
     difference_now: float

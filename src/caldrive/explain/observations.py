@@ -30,7 +30,6 @@ from caldrive.explain.interventions import (
 
 OUTLINE = 2  # pixels to either side of the road's end
 LOWER = 1 / 3  # of a person's height
-FEWEST_EPISODES = 5  # of which an interval says anything
 LEAST = 0.01  # of a probability, or of the attention: what is less is no effect, however sure
 Changed = dict[str, Counterfactual]  # by the name of the change
 Measure = Callable[[Seen, Changed], float | None]  # positive where a statement holds, None where it cannot be asked
@@ -122,7 +121,9 @@ STATEMENTS = (
         "The shadow of a person in the way, without the body, makes a hazard likelier", "hazard by a person",
         _between(ONLY_SHADOW, AWAY),
     ),
-    Statement("Of a person in the way the lower third draws most attention", "hazard by a person", _on_legs),
+    Statement(
+        "Of a person in the way the lower third draws more than its share of attention", "hazard by a person", _on_legs
+    ),
     Statement(
         "Legs alone make a hazard likelier than a torso alone", "hazard by a person", _between(ONLY_LEGS, ONLY_TORSO)
     ),
@@ -145,7 +146,7 @@ class Finding:
     @property
     def verdict(self) -> str:
         """Whether it is true, by the interval alone: which has to lie beyond LEAST, or below it."""
-        if self.interval is None or self.episodes < FEWEST_EPISODES:
+        if self.interval is None:
             return "too few cases"
         low, high = self.interval
         return "true" if low > LEAST else "false" if high < LEAST else "not shown"

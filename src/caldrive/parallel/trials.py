@@ -70,19 +70,23 @@ def mend_journal(out: Path) -> None:
 
 
 def open_journal(
-    out: Path, name: str, direction: Literal["minimize", "maximize"], draw: Draw, pruner: Mapping[str, int]
+    out: Path,
+    name: str,
+    direction: Literal["minimize", "maximize"],
+    draw: Draw,
+    pruner: Mapping[str, int] | None = None,
 ) -> Any:
     """A study in a folder's journal, made if need be. draw: of the trial that it is asked for next; pruner: settings of
-    Optuna's MedianPruner. Raises ValueError where the journal is damaged."""
-    optuna = require_optuna()
+    Optuna's MedianPruner, None for none. Raises ValueError where the journal is damaged."""
+    optuna, path = require_optuna(), str((out / JOURNAL).absolute())  # a lock is a link to it: it must lead there
     samplers = {"random": optuna.samplers.RandomSampler, "tpe": optuna.samplers.TPESampler}
     try:
         return optuna.create_study(
-            storage=optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(out / JOURNAL))),
+            storage=optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(path)),
             study_name=name,
             direction=direction,
             sampler=samplers[draw.sampler](seed=draw.own_seed),
-            pruner=optuna.pruners.MedianPruner(**pruner),
+            pruner=optuna.pruners.NopPruner() if pruner is None else optuna.pruners.MedianPruner(**pruner),
             load_if_exists=True,
         )
     except (ValueError, KeyError, TypeError, AssertionError) as error:
@@ -96,3 +100,14 @@ def abandon(study: Any) -> None:
     optuna = require_optuna()
     for trial in study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
+
+
+def finished(study: Any, own_number: str) -> list[Any]:
+    """The trials of a study that are whole or pruned, one for each own number; own_number: the attribute with that, as
+    Optuna's numbers also count those that were killed."""
+    states = require_optuna().trial.TrialState
+    trials = study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
+    by_number: dict[int, Any] = {}
+    for trial in trials:  # a trial whose result got lost with another process is done again
+        by_number.setdefault(trial.user_attrs[own_number], trial)
+    return list(by_number.values())

@@ -45,8 +45,8 @@ class SearchConfig:
     learning_rate: float = 1e-3
     """Base learning rate."""
     evaluations: int = 5
-    """How often a trial is measured. From the second time on it is pruned where it is worse than the median of those
-    before it; blocks of one frame are quick, and are not."""
+    """How often a trial is measured. From the second time on it is pruned where its best so far is worse than the
+    median of the whole trials then; blocks of one frame are quick, and are not."""
     validation_frames: int = 6000
     """Frames that a trial is measured on, spread evenly over the held-out episodes."""
     validation_share: float = 0.0

@@ -130,12 +130,12 @@ def make_features(source: Source, parts: Sequence[Part], progress: Progress) -> 
     do not fit the network."""
     network, info = load_network(source.model)
     for part in parts:
+        chunks = part.path.with_suffix("")
         if not _is_there(part.path, part.digest):
             seen = Frames([read_episode(episode.path) for episode in part.frames.episodes], network.config.image_size)
-            chunks = part.path.with_suffix("")
             table = feature_table(network, seen, info.ranges, chunks, progress)
             write_tensors(part.path, {"features": table}, {"kind": "features", "digest": part.digest})
-            shutil.rmtree(chunks)
+        shutil.rmtree(chunks, ignore_errors=True)  # also after a kill right before this
 
 
 def _require_targets(frames: Frames, n: int, tasks: Sequence[str], place: str) -> None:

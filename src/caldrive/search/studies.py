@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from caldrive.affordances import BY_NAME
-from caldrive.parallel.trials import Draw, abandon, open_journal, require_optuna
+from caldrive.parallel.trials import Draw, abandon, finished, open_journal, require_optuna
 from caldrive.perception.network.checkpoint import read_info
 from caldrive.perception.network.config import BlockConfig
 from caldrive.search.config import SearchConfig
@@ -74,7 +74,7 @@ def missing_jobs(source: Source, config: SearchConfig) -> list[TrialJob]:
     studies = {task: open_study(source.out, config, task) for task in config.tasks}
     for study in studies.values():
         abandon(study)
-    done = {task: {trial.user_attrs[DRAW] for trial in _finished(study)} for task, study in studies.items()}
+    done = {task: {trial.user_attrs[DRAW] for trial in finished(study, DRAW)} for task, study in studies.items()}
     return [TrialJob(task, draw) for draw in range(config.trials) for task in config.tasks if draw not in done[task]]
 
 
@@ -86,15 +86,9 @@ def finished_trials(source: Source, config: SearchConfig, task: str) -> list[Fin
             draw=trial.user_attrs[DRAW], block=block_of(trial.params, like), value=trial.value,
             pruned=trial.state == pruned, seconds=trial.duration.total_seconds(),
         )
-        for trial in _finished(open_study(source.out, config, task))
+        for trial in finished(open_study(source.out, config, task), DRAW)
     ]  # fmt: skip
     return sorted((trial for trial in trials if trial.draw < config.trials), key=lambda trial: trial.draw)
-
-
-def _finished(study: Any) -> list[Any]:
-    states = require_optuna().trial.TrialState
-    trials: list[Any] = study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
-    return trials
 
 
 def importances(source: Source, config: SearchConfig, task: str) -> dict[str, float]:

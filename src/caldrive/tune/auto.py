@@ -1,27 +1,30 @@
 """A search for the controller's constants with the least cost (Optuna's TPE); one that was stopped goes on.
 
 Each trial draws all searched constants and drives the same maneuvers and routes of town01 in the same order; it is
-pruned where its mean cost so far is worse than the median of earlier trials. What wins is then judged beside the
-controller that the search began with, also on routes that the search has not seen.
+pruned where its mean cost so far is worse than the median of the whole trials' after as many drives. What wins is then
+judged beside the controller that the search began with, also on routes that the search has not seen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from caldrive.checks import MOST_WORKERS, require_within, require_writable_folder
 from caldrive.control.controller import ControlConfig
 from caldrive.files import locked_folder
 from caldrive.parallel.processes import parallel_map
-from caldrive.parallel.trials import Draw, abandon, claim_folder, mend_journal, open_journal, require_optuna
+from caldrive.parallel.trials import Draw, abandon, claim_folder, finished, mend_journal, open_journal, require_optuna
 from caldrive.progress import Progress, silent
+from caldrive.provenance import code_version
 from caldrive.tune.config import TuneConfig
-from caldrive.tune.constants import Constant, constants, controller_toml, values_of, with_values
+from caldrive.tune.constants import Constant, constants, values_of, with_values
 from caldrive.tune.cost import Cost, cost, mean_cost
 from caldrive.tune.maneuvers import MANEUVERS, Maneuver, drive, route
 
@@ -61,13 +64,21 @@ def tune(
     require_within("--workers", workers, 1, MOST_WORKERS, 2)
     require_writable_folder(out)
     with locked_folder(out):
-        claim_folder(out / SETTINGS, config.decisive() | {"controller": controller_toml(controller)})
+        claim_folder(
+            out / SETTINGS, config.decisive() | {"code": code_version(), "controller": _changed_values(controller)}
+        )
         mend_journal(out)
-        missing = missing_trials(out, config, controller)
+        missing = missing_trials(out, config)
         work, total = partial(run_trial, out, config, controller), config.trials
         for done, _ in enumerate(parallel_map(work, missing, workers), total - len(missing) + 1):
             progress(f"trial {done} of {total}", done / total)
         return _findings(out, config, controller, workers, progress)
+
+
+def _changed_values(controller: ControlConfig) -> dict[str, str]:
+    """The constants that are not as usual."""
+    usual = values_of(ControlConfig())
+    return {name: str(value) for name, value in values_of(controller).items() if value != usual[name]}
 
 
 def tuned_maneuvers(config: TuneConfig) -> list[Maneuver]:
@@ -82,41 +93,60 @@ def other_maneuvers(config: TuneConfig) -> list[Maneuver]:
 
 def open_study(out: Path, config: TuneConfig, number: int = 0) -> Any:
     """The study. number: of the trial that it is asked for next."""
-    pruner = {"n_startup_trials": STARTUP_TRIALS, "n_warmup_steps": 0}
-    return open_journal(out, STUDY, "minimize", Draw("tpe", config.seed, number), pruner)
+    return open_journal(out, STUDY, "minimize", Draw("tpe", config.seed, number))
 
 
-def missing_trials(out: Path, config: TuneConfig, controller: ControlConfig) -> list[int]:
-    """The numbers of the trials that are still to be done; the first of all is the controller as it is."""
+def missing_trials(out: Path, config: TuneConfig) -> list[int]:
+    """The numbers of the trials that are still to be done."""
     study = open_study(out, config)
     abandon(study)
-    if not study.get_trials(deepcopy=False):
-        present, searched = values_of(controller), _searched(config, controller)
-        study.enqueue_trial({name: constant.position_of(present[name]) for name, constant in searched.items()})
-    done = {trial.user_attrs[NUMBER] for trial in _finished(study)}
+    done = {trial.user_attrs[NUMBER] for trial in finished(study, NUMBER)}
     return [number for number in range(config.trials) if number not in done]
 
 
 def run_trial(out: Path, config: TuneConfig, controller: ControlConfig, number: int) -> float | None:
-    """What a worker does: one trial. Returns its cost, None where it was pruned."""
-    optuna, study = require_optuna(), open_study(out, config, number)
+    """What a worker does: one trial, 0 being the controller as it is. Returns its cost, None where it was pruned."""
+    optuna, study, searched = require_optuna(), open_study(out, config, number), _searched(config, controller)
+    if number == 0:
+        study.sampler = _as_it_is(study.sampler, controller, searched)
     trial = study.ask()
     trial.set_user_attr(NUMBER, number)
-    tried, costs = with_values(controller, _drawn(trial, config, controller)), list[float]()
+    drawn = {name: trial.suggest_float(name, constant.low, constant.high) for name, constant in searched.items()}
+    tried, costs = with_values(controller, _values(drawn, searched)), list[float]()
     for step, maneuver in enumerate(tuned_maneuvers(config)):
         costs.append(cost(drive(maneuver, tried)).total(config.cost))
-        trial.report(sum(costs) / len(costs), step)
-        if trial.should_prune():
+        mean = sum(costs) / len(costs)
+        trial.report(mean, step)
+        if is_worse(study, step, mean):
             study.tell(trial, state=optuna.trial.TrialState.PRUNED)
             return None
-    study.tell(trial, sum(costs) / len(costs))
-    return sum(costs) / len(costs)
+    study.tell(trial, mean)
+    return mean
 
 
-def _drawn(trial: Any, config: TuneConfig, controller: ControlConfig) -> dict[str, float]:
-    """The constants of a trial, each from its slider's range."""
-    searched = _searched(config, controller)
-    return {name: trial.suggest_float(name, constant.low, constant.high) for name, constant in searched.items()}
+def _as_it_is(sampler: Any, controller: ControlConfig, searched: Mapping[str, Constant]) -> Any:
+    """A sampler that draws a controller's own constants."""
+    present = values_of(controller)
+    fixed = {name: constant.position_of(present[name]) for name, constant in searched.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that it is experimental
+        return require_optuna().samplers.PartialFixedSampler(fixed, sampler)
+
+
+def _values(positions: Mapping[str, float], searched: Mapping[str, Constant]) -> dict[str, Any]:
+    """The constants for positions on their sliders, whose ends may mean no limit."""
+    return {name: searched[name].value_at(round(position, 4)) for name, position in positions.items()}
+
+
+def is_worse(study: Any, step: int, mean: float) -> bool:
+    """Whether a trial is to be pruned: by its mean cost after a step, beside those of the whole trials. Optuna's
+    MedianPruner takes the least cost of all steps, and so lets pass what fails late."""
+    complete = require_optuna().trial.TrialState.COMPLETE
+    whole = study.get_trials(deepcopy=False, states=(complete,))
+    if len(whole) < STARTUP_TRIALS:
+        return False
+    middle: float = median(trial.intermediate_values[step] for trial in whole)
+    return mean > middle
 
 
 def _searched(config: TuneConfig, controller: ControlConfig) -> dict[str, Constant]:
@@ -124,20 +154,14 @@ def _searched(config: TuneConfig, controller: ControlConfig) -> dict[str, Consta
     return {name: by_name[name] for name in config.constants}
 
 
-def _finished(study: Any) -> list[Any]:
-    states = require_optuna().trial.TrialState
-    trials: list[Any] = study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
-    return [trial for trial in trials if NUMBER in trial.user_attrs]
-
-
 def best_controller(out: Path, config: TuneConfig, controller: ControlConfig) -> ControlConfig:
     """That of the cheapest whole trial; the controller itself where none was whole."""
     complete = require_optuna().trial.TrialState.COMPLETE
-    whole = [trial for trial in _finished(open_study(out, config)) if trial.state == complete]
+    whole = [trial for trial in finished(open_study(out, config), NUMBER) if trial.state == complete]
     if not whole:
         return controller
     best = min(whole, key=lambda trial: (trial.value, trial.user_attrs[NUMBER]))
-    return with_values(controller, {name: round(value, 4) for name, value in best.params.items()})
+    return with_values(controller, _values(best.params, _searched(config, controller)))
 
 
 def _findings(out: Path, config: TuneConfig, controller: ControlConfig, workers: int, progress: Progress) -> Findings:
@@ -146,9 +170,9 @@ def _findings(out: Path, config: TuneConfig, controller: ControlConfig, workers:
     before, after = _judged(config, judges, workers, progress)
     if after.tuned.total(config.cost) >= before.tuned.total(config.cost):
         after = before
-    finished = _finished(open_study(out, config))
-    pruned = sum(trial.state == require_optuna().trial.TrialState.PRUNED for trial in finished)
-    return Findings(before, after, len(finished), pruned)
+    trials = finished(open_study(out, config), NUMBER)
+    pruned = sum(trial.state == require_optuna().trial.TrialState.PRUNED for trial in trials)
+    return Findings(before, after, len(trials), pruned)
 
 
 def _judged(config: TuneConfig, controllers: Sequence[ControlConfig], workers: int, progress: Progress) -> list[Judged]:

@@ -180,13 +180,17 @@ class TuningPage:
         try:
             while self._stale:
                 self._stale = False
-                self.drives = await self._driven()
-                self._show()
-        except (ValueError, RuntimeError) as error:
-            self.ui.notify(str(error), type="negative", multi_line=True)
+                await self._redraw_once()
         finally:
             self._busy = False
             self.spinner.set_visibility(False)
+
+    async def _redraw_once(self) -> None:
+        try:
+            self.drives = await self._driven()
+            self._show()
+        except (ValueError, RuntimeError) as error:
+            self.ui.notify(str(error), type="negative", multi_line=True)
 
     async def _driven(self) -> dict[str, Drive]:
         """The drives of A, where it is kept, and of the present setting."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,8 @@ def serve(controller: ControlConfig, path: Path, port: int) -> None:
     nicegui = require_nicegui()
     require_free_port(port)
     nicegui.run.process_pool_start_method = "spawn"
-    nicegui.ui.run(
-        lambda: TuningPage(controller, path).build(), host=HOST, port=port, title="caldrive tune", reload=False,
-        show=False, show_welcome_message=False,
-    )  # fmt: skip
+    with suppress(KeyboardInterrupt):  # the usual end
+        nicegui.ui.run(
+            lambda: TuningPage(controller, path).build(), host=HOST, port=port, title="caldrive tune", reload=False,
+            show=False, show_welcome_message=False,
+        )  # fmt: skip
