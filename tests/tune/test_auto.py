@@ -72,6 +72,7 @@ def test_a_trial_is_pruned_by_its_mean_so_far_and_not_by_its_best(tmp_path: Path
     for _ in range(auto.STARTUP_TRIALS):
         assert not auto.is_worse(study, 1, 9.0)
         trial = study.ask()
+        trial.set_user_attr(auto.NUMBER, trial.number)
         for step, mean in enumerate((0.9, 0.8)):
             trial.report(mean, step)
         study.tell(trial, 0.8)

@@ -1,7 +1,7 @@
 """A search for the controller's constants with the least cost (Optuna's TPE); one that was stopped goes on.
 
 Each trial draws all searched constants and drives the same maneuvers and routes of town01 in the same order; it is
-pruned where its mean cost so far is worse than the median of the whole trials' after as many drives. What wins is then
+pruned where its mean cost so far is worse than the median of those before it after as many drives. What wins is then
 judged beside the controller that the search began with, also on routes that the search has not seen.
 """
 
@@ -30,7 +30,7 @@ from caldrive.tune.maneuvers import MANEUVERS, Maneuver, drive, route
 
 SETTINGS, STUDY = "tune.json", "constants"
 NUMBER = "number"  # a trial's own; Optuna's also counts those that were killed
-STARTUP_TRIALS = 10  # that are whole before any is pruned
+STARTUP_TRIALS = 10  # that have come to a drive before any is pruned there
 
 
 @dataclass(frozen=True)
@@ -139,14 +139,12 @@ def _values(positions: Mapping[str, float], searched: Mapping[str, Constant]) ->
 
 
 def is_worse(study: Any, step: int, mean: float) -> bool:
-    """Whether a trial is to be pruned: by its mean cost after a step, beside those of the whole trials. Optuna's
-    MedianPruner takes the least cost of all steps, and so lets pass what fails late."""
-    complete = require_optuna().trial.TrialState.COMPLETE
-    whole = study.get_trials(deepcopy=False, states=(complete,))
-    if len(whole) < STARTUP_TRIALS:
-        return False
-    middle: float = median(trial.intermediate_values[step] for trial in whole)
-    return mean > middle
+    """Whether a trial is to be pruned: by its mean cost after a step, beside those of all trials that came so far.
+    Optuna's MedianPruner takes the least cost of all steps, and so lets pass what fails late."""
+    reached = [
+        trial.intermediate_values[step] for trial in finished(study, NUMBER) if step in trial.intermediate_values
+    ]
+    return len(reached) >= STARTUP_TRIALS and mean > float(median(reached))
 
 
 def _searched(config: TuneConfig, controller: ControlConfig) -> dict[str, Constant]:
