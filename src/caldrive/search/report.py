@@ -10,6 +10,7 @@ from typing import Any
 
 from caldrive.affordances import BY_NAME
 from caldrive.files import write_figure, write_whole
+from caldrive.formats import markdown_table, toml
 from caldrive.perception.network.config import BlockConfig
 from caldrive.search.best import Retrained
 from caldrive.search.config import SearchConfig
@@ -85,11 +86,6 @@ def _about(findings: Findings, config: SearchConfig) -> str:
     )
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def _parameters(block: BlockConfig) -> list[str]:
     return [block.layer, str(block.nodes), f"{block.dropout:.2f}", str(block.length), str(block.dilation)]
 
@@ -101,7 +97,7 @@ def _best_blocks(findings: Findings) -> str:
         [BY_NAME[task.task].title, *_parameters(task.best.block), *_parameters(getattr(PUBLISHED, task.task))]
         for task in findings.tasks
     )
-    return _table(head, rows)
+    return markdown_table(head, rows)
 
 
 def _trained_again(findings: Findings) -> str:
@@ -117,7 +113,7 @@ def _trained_again(findings: Findings) -> str:
         for task in findings.tasks
         for block in task.retrained
     )
-    return _table(head, rows)
+    return markdown_table(head, rows)
 
 
 def _searched(task: TaskFindings, block: Retrained) -> str:
@@ -141,19 +137,19 @@ def _temporal(findings: Findings) -> str:
         paper = PUBLISHED_TEMPORAL[task.task]
         theirs = [*(printed(task.task, value) for value in paper), change(*paper)]
         rows.append([BY_NAME[task.task].title, "IoU" if BY_NAME[task.task].discrete else "MAE", *ours, *theirs])
-    return _table(head, rows)
+    return markdown_table(head, rows)
 
 
 def _joint(findings: Findings) -> str:
     joint = findings.networks["groups"].scores
     rows = ([BY_NAME[name].title, printed(name, findings.before[name]), printed(name, joint[name])] for name in joint)
-    return _table(("task", "the network before", "the best blocks"), rows)
+    return markdown_table(("task", "the network before", "the best blocks"), rows)
 
 
 def _conditioning(tasks: Sequence[TaskFindings]) -> str:
     kinds = [block.block.conditioning for block in tasks[0].conditioned]
     rows = ([BY_NAME[task.task].title, *(_again(task, block) for block in task.conditioned)] for task in tasks)
-    return _table(("task", *kinds), rows)
+    return markdown_table(("task", *kinds), rows)
 
 
 def result_values(findings: Findings, page: Path) -> dict[str, Any]:
@@ -176,10 +172,4 @@ def result_values(findings: Findings, page: Path) -> dict[str, Any]:
 
 def blocks_toml(findings: Findings) -> str:
     """The best blocks as settings, for `caldrive train --config`."""
-    parts = []
-    for task in findings.tasks:
-        lines = [f"[network.{task.task}]"]
-        for name, value in asdict(task.best.block).items():
-            lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value}")
-        parts.append("\n".join(lines))
-    return "\n\n".join(parts) + "\n"
+    return toml({"network": {task.task: asdict(task.best.block) for task in findings.tasks}})

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import json
 import math
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -21,6 +20,7 @@ from caldrive.control.controller import ControlConfig
 from caldrive.control.limits import LIMITS, USUAL
 from caldrive.control.presets import DEFAULT, PRESETS
 from caldrive.files import write_whole
+from caldrive.formats import toml
 
 PAIR = ("gain", "damping")  # what the two numbers of a steering law are
 REACH = 3.0  # a slider's end, in units of the largest value that a preset has
@@ -133,8 +133,7 @@ def controller_toml(config: ControlConfig) -> str:
     """The file that `--controller` takes: what differs from the nearest preset."""
     changes = {name: _differences(asdict(config), asdict(preset)) for name, preset in PRESETS.items()}
     nearest = min(changes, key=lambda name: len(values_in(changes[name])))
-    lines = [f"preset = {json.dumps(nearest)}", *_lines(changes[nearest])]
-    return "\n".join(lines) + "\n"
+    return toml({"preset": nearest} | changes[nearest])
 
 
 def values_in(nested: Mapping[str, Any]) -> list[Any]:
@@ -157,23 +156,3 @@ def _differences(values: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str
         elif value != base[name]:
             found[name] = value
     return found
-
-
-def _lines(values: Mapping[str, Any], table: str = "") -> Iterator[str]:
-    """Nested dictionaries as TOML, what stands in no table first."""
-    plain = {name: value for name, value in values.items() if not isinstance(value, dict)}
-    if plain and table:
-        yield f"\n[{table}]"
-    yield from (f"{name} = {_literal(value)}" for name, value in plain.items())
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _lines(value, f"{table}.{name}" if table else name)
-
-
-def _literal(value: Any) -> str:
-    """A value in TOML."""
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_literal, value))}]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(round(value, DIGITS)) if isinstance(value, float) else str(value)

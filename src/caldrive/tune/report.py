@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from caldrive.files import write_whole
+from caldrive.formats import markdown_table
 from caldrive.tune.auto import Findings, Judged, changed_constants
 from caldrive.tune.config import TuneConfig
 from caldrive.tune.constants import write_controller
@@ -70,19 +71,14 @@ def _sections(findings: Findings, config: TuneConfig) -> Iterable[str]:
         f"{', '.join(driven)} with the true affordances."
     )
     yield "## Mean cost of a drive"
-    yield _table(HEADS, cost_rows(findings, config))
+    yield markdown_table(HEADS, cost_rows(findings, config))
     yield (
         f"cost: the sum of the parts, weighted ({weights}); time: share of the time limit; jerk: RMS, in units of 8.37 "
         "m/s³; centre: mean distance to the centre line, in units of 0.334 m; infractions: at fault, and goals missed."
     )
     yield "## Constants that changed"
     yield (
-        _table(("constant", "before", "after"), constant_rows(findings))
+        markdown_table(("constant", "before", "after"), constant_rows(findings))
         if changed_constants(findings)
         else ("None: nothing was found that costs less.")
     )
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

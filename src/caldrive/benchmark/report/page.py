@@ -11,6 +11,7 @@ from caldrive.benchmark.report.failure_cards import failures_section
 from caldrive.benchmark.report.figures import errors_figure, map_figure, speed_figure, success_figure
 from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Table, failures
 from caldrive.benchmark.report.tables import counted, headline, tables
+from caldrive.formats import markdown_table
 
 _DATA = Path(__file__).parent
 FAILURE_HEAD = ("agent", "episode", "outcome", "how it began", "infractions", "wrong in the 3 s before")
@@ -60,23 +61,13 @@ def report_text(runs: Sequence[BenchmarkRun]) -> str:
     """The report as Markdown."""
     parts, failed = ["# Benchmark", "", headline(runs), ""], failures(runs)
     for table in tables(runs):
-        parts += [f"## {table.title}", "", table.text, "", *_markdown_table(table.head, table.rows), ""]
+        parts += [f"## {table.title}", "", table.text, "", markdown_table(table.head, table.rows), ""]
     whose = "its" if len(failed) == 1 else "their"
     parts += ["## Failures", "", f"{counted(len(failed), 'episode')} missed {whose} goal or broke a rule.", ""]
     head = (*FAILURE_HEAD, "to blame") if any(failure.explanation.blame for failure in failed) else FAILURE_HEAD
     rows = [(*_failure_row(failure), failure.explanation.blame)[: len(head)] for failure in failed]
-    parts += _markdown_table(head, rows)
+    parts.append(markdown_table(head, rows))
     return "\n".join(parts) + "\n"
-
-
-def _markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    lines = ("| " + " | ".join(map(_markdown_cell, row)) + " |" for row in (head, *rows))
-    return [next(lines), "|" + "---|" * len(head), *lines]
-
-
-def _markdown_cell(text: str) -> str:
-    """A text from a file as one cell: no line may end in it, and no other cell begin."""
-    return " ".join(text.splitlines()).replace("|", "\\|")
 
 
 def _failure_row(failure: Failure) -> tuple[str, ...]:
