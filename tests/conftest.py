@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from caldrive.scenarios import TOWNS
 
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from caldrive.perception.dataset.frames import Frames
     from caldrive.world.rendering.camera import CameraRig
     from caldrive.world.roads.network import RoadNetwork
+
+# How fast drawn examples come tells how busy the machine is.
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
 
 
 def _roads(town: str) -> RoadNetwork:
