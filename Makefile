@@ -8,22 +8,31 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 MODEL := out/model
 
-.PHONY: drive test lint docs coverage newest model baselines results clean
+.PHONY: drive test tests lint style types docs coverage newest model baselines results clean
 drive: $(READY)
 	$(BIN)/caldrive drive --town town02 --weather 14 --task straight --route 4 --cars 15 --people 50 --cap 20 --out out/drive $(ARGS)
 
-# Each of the two has a core of its own: more threads would only take turns.
-PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest -n 2
+# Each of the two has a core of its own: more threads would only take turns. A file's tests stay together, so that what
+# they share is made once.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile
 
-test: $(READY) lint docs
+# What takes seconds comes first; then no core waits for a single process.
+test: style
+	$(MAKE) --no-print-directory --jobs 3 types docs tests
+
+tests: $(READY)
 	$(PYTEST) $(ARGS)
 
-lint: $(READY)
+lint: style types
+
+style: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python scripts/large_files.py
+
+types: $(READY)
+	$(BIN)/mypy
 
 # The tests once more, and the share of the lines that they reach. Not a part of `test`: with Python 3.11 counting takes
 # 40 % more time. From 3.12 on Python counts by itself (sys.monitoring).
@@ -68,13 +77,15 @@ baselines: $(READY)
 results: $(READY)
 	$(BIN)/python -m scripts.drive_results $(ARGS)
 
-# An environment that is there stays: it may hold PyTorch's CPU build, for the Python that it was made with.
+# An environment that is there stays: it may hold PyTorch's CPU build, for the Python that it was made with. Bytecode is
+# made on all cores, as pip would use one; a few files of libraries are no Python.
 USED = $(or $(wildcard $(BIN)/python),$(PYTHON))
 $(READY): pyproject.toml constraints.txt
 	@$(USED) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
 		{ echo "Found $$($(USED) --version), need Python 3.11 to 3.13: install one or run make PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[opendrive,docs,test]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable '.[opendrive,docs,test]'
+	$(BIN)/python -m compileall -qq -j 0 -x '/tests?/' .venv/lib || true
 	touch $(READY)
 
 clean:

@@ -83,7 +83,7 @@ def test_the_wheel_drives_from_the_camera_and_films(installed: Installed) -> Non
 def test_the_wheel_benchmarks_and_reports(installed: Installed) -> None:
     (installed.desk / "suite.json").write_text(to_json(suite("quick")[:1]))
     shorten_suites(installed.desk)
-    installed.caldrive("benchmark", "--suite", "suite.json", "--workers", "1", "--out", "run")
+    installed.caldrive("benchmark", "--agent", "oracle", "--suite", "suite.json", "--workers", "1", "--out", "run")
     assert len((installed.desk / "run" / "results.jsonl").read_text().splitlines()) == 1
     installed.caldrive("report", "run", "--out", "report")
     assert (installed.desk / "report" / "report.html").stat().st_size > 10_000

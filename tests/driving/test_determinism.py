@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from caldrive.driving.determinism import EpisodeDigests, compare
+from caldrive.driving.determinism import EpisodeDigests, compare, drive_and_digest
+from caldrive.driving.settings import DeterminismSettings
 
 STEPS = tuple(("image", "truth", "decision", f"control{i}") for i in range(5))
 OTHER_CONTROL = (*STEPS[:3], ("image", "truth", "decision", "another"), STEPS[4])
@@ -33,3 +34,10 @@ def test_a_comparison_names_the_first_step_and_part_that_differ(second: EpisodeD
 def test_the_time_of_a_difference_is_in_the_worlds_steps() -> None:
     slow = [EpisodeDigests(steps, result="r", dt=0.5) for steps in (STEPS, OTHER_CONTROL)]
     assert compare(*slow).difference == "step 3 (1.5 s) differs in its control"
+
+
+@pytest.mark.usefixtures("no_sumo_left")
+def test_every_step_of_a_drive_has_digests_of_its_own() -> None:
+    driven = drive_and_digest(DeterminismSettings(agent="oracle", town="town02", seconds=1.0))
+    images, truths, _, _ = zip(*driven.steps, strict=True)
+    assert len(set(images)) == len(set(truths)) == len(driven.steps) == 11

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import math
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from dataclasses import astuple, replace
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -271,25 +268,3 @@ def test_a_closed_world_can_be_entered_again(world: EmbeddedWorld) -> None:
 def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], message: str, world: EmbeddedWorld) -> None:
     with pytest.raises(ValueError, match=message):
         world.reset(replace(along_the_street(), **change))
-
-
-def digests_of_a_drive() -> list[str]:
-    """Digests of images, controls and truths of a short drive of the oracle."""
-    world = EmbeddedWorld(CameraConfig(width=100, height=44))
-    agent, digests = oracle(world), []
-    observation = world.reset(along_the_street(n_vehicles=15, n_pedestrians=30, seed=5))
-    agent.reset()
-    for _ in range(15):
-        control = agent.act(observation)
-        content = observation.image.tobytes() + repr((control, world.truth())).encode()
-        digests.append(hashlib.sha256(content).hexdigest())
-        observation = world.step(control)
-    world.close()
-    return digests
-
-
-def test_two_processes_see_and_do_the_same_to_the_last_bit() -> None:
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        first, second = (pool.submit(digests_of_a_drive) for _ in range(2))
-        assert first.result() == second.result()
-        assert len(set(first.result())) == 15

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import savgol_filter
 
 Column = NDArray[np.float64]  # (N,), a value for each step
 FRAME_METRICS = ("jerk_frame", "lateral_straight_frame", "lateral_turn_frame")
@@ -45,6 +44,8 @@ def motion(speed: Column, heading: Column, dt: float) -> dict[str, float]:
     """
     if len(speed) < WINDOW:
         return dict.fromkeys(METRICS[1:-1], 0.0) | {"comfortable": 1.0}
+    from scipy.signal import savgol_filter  # takes a second to load: who records or learns does without
+
     changes = _changes(speed, heading, dt)
     speed, acceleration, jerk = (savgol_filter(speed, WINDOW, 2, deriv=k, delta=dt) for k in range(3))
     yaw_rate, yaw_acceleration = (savgol_filter(heading, WINDOW, 2, deriv=k, delta=dt) for k in (1, 2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,12 +16,14 @@ def _one_thread() -> None:
     torch.set_num_threads(1)
 
 
-@pytest.fixture(autouse=True)
-def _no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module", autouse=True)
+def _no_drawing() -> Iterator[None]:
     """Half of a tiny training's time would go into its curves, which test_folder.py draws."""
-    monkeypatch.setattr(
-        "caldrive.perception.training.folder.draw_curves", lambda rows, figures, path: path.write_bytes(b"curves")
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "caldrive.perception.training.folder.draw_curves", lambda rows, figures, path: path.write_bytes(b"curves")
+        )
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,18 @@ from caldrive.perception.training import history_stage
 from caldrive.perception.training.train import train
 from caldrive.recordings.folder import find_episodes, split
 from tests.perception.data import HEIGHT, HISTORY, SHORT, TINY, WIDTH
+
+
+@pytest.fixture(scope="module")
+def whole(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The network of a training that nobody stopped."""
+    return train(HISTORY, folder, tmp_path_factory.mktemp("whole"), TINY)
+
+
+@pytest.fixture
+def finished(whole: Path, tmp_path: Path) -> Path:
+    """A copy of its folder."""
+    return Path(shutil.copytree(whole.parent, tmp_path / "finished"))
 
 
 def test_the_blocks_learn_and_the_backbone_stays_as_it_is(folder: Path, tmp_path: Path) -> None:
@@ -71,9 +84,8 @@ def test_until_the_second_stage_blocks_see_no_history(folder: Path, tmp_path: Pa
 
 @pytest.mark.parametrize("place", ["_features", "_history_batch"])
 def test_a_run_killed_in_the_second_stage_resumes_to_the_same_network(
-    place: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    place: str, whole: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = train(HISTORY, folder, tmp_path / "whole", TINY)
     monkeypatch.setattr(history_stage, "FRAMES_A_FILE", 50)
     original, calls = getattr(history_stage, place), list[None]()
 
@@ -93,17 +105,17 @@ def test_a_run_killed_in_the_second_stage_resumes_to_the_same_network(
     assert len(calls) == {"_features": 5, "_history_batch": 8}[place]
 
 
-def test_a_finished_run_stays_as_it_is(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = train(HISTORY, folder, tmp_path, TINY).read_bytes()
+def test_a_finished_run_stays_as_it_is(
+    whole: Path, finished: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(history_stage, "_features", None)
-    assert train(HISTORY, folder, tmp_path, TINY).read_bytes() == before
+    assert train(HISTORY, folder, finished, TINY).read_bytes() == whole.read_bytes()
 
 
-def test_features_of_another_run_are_not_taken_up(folder: Path, tmp_path: Path) -> None:
-    expected = train(HISTORY, folder, tmp_path / "wanted", TINY)
+def test_features_of_another_run_are_not_taken_up(whole: Path, folder: Path, tmp_path: Path) -> None:
     stale = {"features": torch.zeros(160, 256)}
     write_tensors(tmp_path / "again" / "features" / "0000.safetensors", stale, {"digest": "another"})
-    assert train(HISTORY, folder, tmp_path / "again", TINY).read_bytes() == expected.read_bytes()
+    assert train(HISTORY, folder, tmp_path / "again", TINY).read_bytes() == whole.read_bytes()
 
 
 def test_the_digest_of_features_depends_on_all_that_makes_them(folder: Path, tmp_path: Path) -> None:
@@ -120,11 +132,10 @@ def test_the_digest_of_features_depends_on_all_that_makes_them(folder: Path, tmp
     assert len({digest, *digests}) == 5
 
 
-def test_a_kill_after_the_last_step_leaves_no_features(folder: Path, tmp_path: Path) -> None:
-    train(HISTORY, folder, tmp_path, TINY)
-    write_tensors(tmp_path / "features" / "0000.safetensors", {"features": torch.zeros(1)}, {})
-    train(HISTORY, folder, tmp_path, TINY)
-    assert not (tmp_path / "features").exists()
+def test_a_kill_after_the_last_step_leaves_no_features(finished: Path, folder: Path) -> None:
+    write_tensors(finished / "features" / "0000.safetensors", {"features": torch.zeros(1)}, {})
+    train(HISTORY, folder, finished, TINY)
+    assert not (finished / "features").exists()
 
 
 def test_features_are_those_of_the_network_that_drives(folder: Path, tmp_path: Path) -> None:

@@ -41,7 +41,8 @@ class Backbone(nn.Module):
             self.norms.append(nn.BatchNorm2d(n_out) if batch_norm else nn.Identity())
             n_in = n_out
         for conv in self.convolutions():
-            nn.init.kaiming_normal_(conv.weight, nonlinearity="relu")
+            if not conv.weight.is_meta:  # there torch would load its compiler first, which takes seconds
+                nn.init.kaiming_normal_(conv.weight, nonlinearity="relu")
             conv.weight.data = conv.weight.data.contiguous(memory_format=torch.channels_last)
 
     def convolutions(self) -> list[nn.Conv2d]:
