@@ -1,0 +1,198 @@
+"""The connection to a CARLA server: its map, its clock, and what is put back when a drive is over.
+
+CARLA answers one client at a time with a step, and keeps what a client leaves behind. So everything of ours carries a
+name by which the next connection finds and removes it, even if the process that made it was killed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from caldrive.datatypes import DT
+from caldrive.files import write_whole
+from caldrive.scenarios import TOWNS, generated_town
+from caldrive.user_cache import own_folders
+
+OURS = "caldrive"  # the role name of all that is spawned
+PATIENCE, LOADING = 20.0, 120.0  # s to wait for an answer, and for a map
+FIRST_PATIENCE = 5.0  # s for the first answer of a server, and for a sign of life
+SUBSTEPS = 10  # of a step, 0.01 s each, as CARLA's physics wants them
+BEGIN = 1.0  # s of a new server's clock at which driving begins
+
+
+def carla_module() -> Any:
+    """CARLA's client library. Raises RuntimeError where it is not installed."""
+    try:
+        import carla
+    except ModuleNotFoundError as error:
+        if error.name != "carla":
+            raise
+        raise RuntimeError(
+            "found no CARLA client, wanted carla 0.9.16, which Python 3.10 to 3.12 can have: type pip install "
+            "'caldrive[carla]'"
+        ) from error
+    return carla
+
+
+class Connection:
+    """A client of the server at a host and port. carla: the client library; world: CARLA's world.
+
+    Raises RuntimeError where no server of the client's version answers.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self.carla, self._address = carla_module(), f"{host}:{port}"
+        self._before: Any = None  # the settings that it had
+        self._spawned: list[Any] = []
+        with self.answers():
+            # One thread hands out all messages: in the order in which they come.
+            self.client = self.carla.Client(host, port, 1)
+            self.client.set_timeout(FIRST_PATIENCE)
+            self._check_version()
+            self.client.set_timeout(PATIENCE)
+            self.world = self.client.get_world()
+
+    def _check_version(self) -> None:
+        wanted, found = self.client.get_client_version(), self.client.get_server_version()
+        if _release(wanted) != _release(found):
+            raise RuntimeError(
+                f"found CARLA {found} at {self._address}, wanted {wanted}, which the client speaks: start that server, "
+                f"or type pip install carla=={found}"
+            )
+
+    @contextmanager
+    def answers(self) -> Iterator[None]:
+        """Says in a sentence that the server does not answer. Raises RuntimeError."""
+        try:
+            yield
+        except RuntimeError as error:
+            if "time-out" not in str(error) and "rpc" not in str(error):
+                raise
+            raise RuntimeError(
+                f"found no answer from CARLA at {self._address}, wanted a server there: start it (CarlaUE4.sh, or "
+                "caldrive serve-carla), or give another --host and --port"
+            ) from error
+
+    def is_alive(self) -> bool:
+        """Whether the server still answers."""
+        self.client.set_timeout(FIRST_PATIENCE)
+        try:
+            self.client.get_server_version()
+        except RuntimeError:
+            return False
+        self.client.set_timeout(PATIENCE)
+        return True
+
+    @property
+    def map_name(self) -> str:
+        """The map's, without its folder: Town01."""
+        return str(self.world.get_map().name.rpartition("/")[2])
+
+    def load_map(self, name: str) -> None:
+        """Loads a map, if it is not there already. Raises ValueError where the server has none of this name."""
+        with self.answers():
+            if self.map_name == name:
+                return
+            names = [path.rpartition("/")[2] for path in self.client.get_available_maps()]
+            if name not in names and generated_town(name) is None:
+                raise ValueError(
+                    f"found no map {name!r} on the server, wanted one of {', '.join(sorted(names))}: give another "
+                    "--town"
+                )
+            self.client.set_timeout(LOADING)
+            self.world = self.client.load_world(name, False)
+            self.client.set_timeout(PATIENCE)
+
+    def town_of(self, town: str) -> str:
+        """Loads the map of a scenario's town and returns the town as `load_town` takes it: caldrive's own by name, an
+        OpenDRIVE file by its path, and another from the OpenDRIVE that the server gives. Raises ValueError as above."""
+        self.load_map(Path(town).stem if town.endswith(".xodr") else town)
+        if town in TOWNS or generated_town(town) or town.endswith(".xodr"):
+            return town
+        return str(self.map_file())
+
+    def map_file(self) -> Path:
+        """The map as an OpenDRIVE file, kept in the user's cache. Raises RuntimeError where there is no room."""
+        with self.answers():
+            content = self.world.get_map().to_opendrive().encode()
+        name = Path("carla", hashlib.sha256(content).hexdigest()[:16], f"{self.map_name}.xodr")
+        for folder in own_folders():
+            with suppress(OSError):  # full, read-only, a file in the way: the next one may do
+                if not (folder / name).is_file():
+                    write_whole(folder / name, content)
+                return folder / name
+        raise RuntimeError("found no folder to keep the map in, wanted one: set XDG_CACHE_HOME to a folder of yours")
+
+    def synchronise(self) -> None:
+        """Removes what an earlier drive left, and lets the server step when it is told to, from now on."""
+        if self._before is not None:
+            return
+        with self.answers():
+            settings = self.world.get_settings()
+            self._before = self.world.get_settings()
+            if left := self._left_behind():
+                self._remove(left)
+                self._before.synchronous_mode, self._before.fixed_delta_seconds = False, None
+            settings.synchronous_mode, settings.fixed_delta_seconds = True, DT
+            settings.max_substeps, settings.max_substep_delta_time = SUBSTEPS, DT / SUBSTEPS
+            self.world.apply_settings(settings)
+            while self.time < BEGIN:  # the client asks for some steps of its own, and not always as many
+                self.tick()
+
+    def _left_behind(self) -> list[int]:
+        return [one.id for one in self.world.get_actors() if one.attributes.get("role_name") == OURS]
+
+    @property
+    def time(self) -> float:
+        """s of the server's clock."""
+        return float(self.world.get_snapshot().timestamp.elapsed_seconds)
+
+    def tick(self) -> int:
+        """A step of the world; returns its frame."""
+        with self.answers():
+            return int(self.world.tick(PATIENCE))
+
+    def blueprint(self, name: str, **attributes: Any) -> Any:
+        """What an actor of ours is made from."""
+        found = self.world.get_blueprint_library().find(name)
+        for key, value in {"role_name": OURS, **attributes}.items():
+            if found.has_attribute(key):
+                found.set_attribute(key, str(value))
+        return found
+
+    def spawn(self, blueprint: Any, place: Any, carrier: Any = None) -> Any:
+        """An actor at a transform of CARLA's, relative to a carrier's where there is one; None where there is no
+        room."""
+        actor = self.world.try_spawn_actor(blueprint, place, carrier)
+        if actor is not None:
+            self._spawned.append(actor)
+        return actor
+
+    def clear(self) -> None:
+        """Removes all that was spawned, the last first."""
+        spawned, self._spawned = self._spawned[::-1], []
+        for actor in spawned:
+            if getattr(actor, "is_listening", False):
+                actor.stop()
+        self._remove([actor.id for actor in spawned])
+
+    def _remove(self, ids: Sequence[int]) -> None:
+        if ids:
+            self.client.apply_batch_sync([self.carla.command.DestroyActor(id) for id in ids], False)
+
+    def close(self) -> None:
+        """Removes all that was spawned and puts the settings back, if the server still hears it."""
+        if self.is_alive():
+            with suppress(RuntimeError):  # it has gone meanwhile, and all with it
+                self.clear()
+                if self._before is not None:
+                    self.world.apply_settings(self._before)
+
+
+def _release(version: str) -> list[str]:
+    """0.9.16 of 0.9.16-dirty."""
+    return version.replace("-", ".").split(".")[:3]
