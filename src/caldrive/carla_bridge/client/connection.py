@@ -7,6 +7,7 @@ name by which the next connection finds and removes it, even if the process that
 from __future__ import annotations
 
 import hashlib
+import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -48,6 +49,7 @@ class Connection:
         self.carla, self._address = carla_module(), f"{host}:{port}"
         self._before: Any = None  # the settings that it had
         self._spawned: list[Any] = []
+        self._manager: Any = None
         with self.answers():
             # One thread hands out all messages: in the order in which they come.
             self.client = self.carla.Client(host, port, 1)
@@ -70,7 +72,7 @@ class Connection:
         try:
             yield
         except RuntimeError as error:
-            if "time-out" not in str(error) and "rpc" not in str(error):
+            if "time-out" not in str(error) and "rpc::" not in str(error):
                 raise
             raise RuntimeError(
                 f"found no answer from CARLA at {self._address}, wanted a server there: start it (CarlaUE4.sh, or "
@@ -172,6 +174,17 @@ class Connection:
             self._spawned.append(actor)
         return actor
 
+    def traffic_manager(self, seed: int) -> Any:
+        """CARLA's traffic manager, which steps with the world and draws from a seed."""
+        if self._manager is None:
+            with socket.socket() as probe:  # another client may have the usual port
+                probe.bind(("", 0))
+                port = probe.getsockname()[1]
+            self._manager = self.client.get_trafficmanager(port)
+            self._manager.set_synchronous_mode(True)
+        self._manager.set_random_device_seed(seed)
+        return self._manager
+
     def clear(self) -> None:
         """Removes all that was spawned, the last first."""
         spawned, self._spawned = self._spawned[::-1], []
@@ -179,6 +192,8 @@ class Connection:
             if getattr(actor, "is_listening", False):
                 actor.stop()
         self._remove([actor.id for actor in spawned])
+        if spawned:
+            self.tick()  # until then they are still counted
 
     def _remove(self, ids: Sequence[int]) -> None:
         if ids:
@@ -189,6 +204,9 @@ class Connection:
         if self.is_alive():
             with suppress(RuntimeError):  # it has gone meanwhile, and all with it
                 self.clear()
+                if self._manager is not None:
+                    self._manager.set_synchronous_mode(False)
+                    self._manager.shut_down()
                 if self._before is not None:
                     self.world.apply_settings(self._before)
 

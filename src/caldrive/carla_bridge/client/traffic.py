@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,9 @@ from caldrive.carla_bridge.client.connection import Connection
 from caldrive.scenarios import Scenario
 
 CROSSING = 0.1  # share of the people who may cross the road, where a scenario has them cross as often as usual
-WALK = 1  # which of a walker's recommended speeds: 0 stands, 2 runs
+WALKING = 1  # which of a walker's recommended speeds; the others stand and run
 TRIES = 3  # places for each person, as somebody may stand there
+CONTROLLER = "controller.ai.walker"
 
 
 def populate(connection: Connection, scenario: Scenario) -> None:
@@ -29,35 +29,37 @@ def populate(connection: Connection, scenario: Scenario) -> None:
 
 def _add_cars(connection: Connection, n: int, rng: np.random.Generator) -> None:
     """Cars with four wheels at the map's own places."""
-    blueprints = connection.world.get_blueprint_library().filter("vehicle.*")
-    names = sorted(one.id for one in blueprints if int(one.get_attribute("number_of_wheels")) == 4)
+    library = connection.world.get_blueprint_library().filter("vehicle.*")
+    names = sorted(one.id for one in library if int(one.get_attribute("number_of_wheels")) == 4)
     manager = connection.traffic_manager(seed=int(rng.integers(2**31)))
-    for place in rng.permutation(np.array(connection.world.get_map().get_spawn_points(), dtype=object)):
-        if n == 0:
-            break
-        car = connection.spawn(connection.blueprint(str(rng.choice(names))), place)
+    places = connection.world.get_map().get_spawn_points()
+    for k in rng.permutation(len(places)).tolist():
+        car = connection.spawn(connection.blueprint(str(rng.choice(names))), places[k])
         if car is not None:
             car.set_autopilot(True, manager.get_port())
             n -= 1
+        if n == 0:
+            break
 
 
 def _add_people(connection: Connection, n: int, crossing: float, rng: np.random.Generator) -> None:
     """People on the sidewalks, who walk where they like."""
-    world, names = connection.world, sorted(one.id for one in connection.world.get_blueprint_library().filter("walker.*"))
+    world, nowhere = connection.world, connection.carla.Transform()
+    names = sorted(one.id for one in world.get_blueprint_library().filter("walker.pedestrian.*"))
     world.set_pedestrians_seed(int(rng.integers(2**31)))
     world.set_pedestrians_cross_factor(min(1.0, CROSSING * crossing))
-    walkers = list[tuple[Any, Any]]()
+    walkers = list[tuple[Any, float]]()
     for _ in range(TRIES * n):
-        at = world.get_random_location_from_navigation()
-        if at is None or len(walkers) == n:  # a map without a mesh has nobody on foot
+        place = world.get_random_location_from_navigation()
+        if place is None or len(walkers) == n:  # without a mesh nobody can walk
             break
         blueprint = connection.blueprint(str(rng.choice(names)), is_invincible=False)
-        walker = connection.spawn(blueprint, connection.carla.Transform(at))
-        if walker is not None:
-            walkers.append((walker, connection.spawn(connection.blueprint("controller.ai.walker"), connection.carla.Transform(), walker)))
+        if (walker := connection.spawn(blueprint, connection.carla.Transform(place))) is not None:
+            walkers.append((walker, float(blueprint.get_attribute("speed").recommended_values[WALKING])))
     connection.tick()  # before it a walker is nowhere
-    for walker, controller in walkers:
+    controllers = [connection.spawn(connection.blueprint(CONTROLLER), nowhere, walker) for walker, _ in walkers]
+    connection.tick()
+    for controller, (_, speed) in zip(controllers, walkers, strict=True):
         controller.start()
         controller.go_to_location(world.get_random_location_from_navigation())
-        speeds = walker.attributes
-        controller.set_max_speed(1.4)
+        controller.set_max_speed(speed)
