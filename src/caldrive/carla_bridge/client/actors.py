@@ -35,9 +35,7 @@ Offset = tuple[float, float]
 def place_of(transform: Any, offset: Offset) -> Placement:
     """A transform of CARLA's in our axes. offset: the map's, see `RoadNetwork.offset`."""
     at, turned = transform.location, transform.rotation
-    return from_carla(
-        at.x - offset[0], at.y + offset[1], at.z, turned.pitch, turned.yaw, turned.roll
-    )  # fmt: skip
+    return from_carla(at.x - offset[0], at.y + offset[1], at.z, turned.pitch, turned.yaw, turned.roll)
 
 
 def transform_of(carla: Any, pose: Pose, height: float, offset: Offset) -> Any:
@@ -86,10 +84,14 @@ class Actors:
         on_road = shapely.contains_xy(self._roads.roadway, at[:, 0], at[:, 1]).tolist()
         return tuple(
             PedestrianState(
-                place.pose, forward_speed(actor.get_velocity(), place.heading), max(box.extent.x, box.extent.y), on, str(actor.id)
+                place.pose,
+                speed=forward_speed(actor.get_velocity(), place.heading),
+                radius=max(box.extent.x, box.extent.y),
+                on_road=on,
+                id=str(actor.id),
             )
             for (actor, box, place), on in zip(people, on_road, strict=True)
-        )  # fmt: skip
+        )
 
     def lights(self) -> tuple[TrafficLight, ...]:
         """In the order of the roads' posts. A post without a light of CARLA's is always green."""

@@ -94,16 +94,20 @@ class Connection:
         """The map's, without its folder: Town01."""
         return str(self.world.get_map().name.rpartition("/")[2])
 
+    def map_names(self) -> list[str]:
+        """Those that the server has."""
+        with self.answers():
+            return sorted({path.rpartition("/")[2] for path in self.client.get_available_maps()})
+
     def load_map(self, name: str) -> None:
         """Loads a map, if it is not there already. Raises ValueError where the server has none of this name."""
         with self.answers():
             if self.map_name == name:
                 return
-            names = [path.rpartition("/")[2] for path in self.client.get_available_maps()]
+            names = self.map_names()
             if name not in names and generated_town(name) is None:
                 raise ValueError(
-                    f"found no map {name!r} on the server, wanted one of {', '.join(sorted(names))}: give another "
-                    "--town"
+                    f"found no map {name!r} on the server, wanted one of {', '.join(names)}: give another --town"
                 )
             self.client.set_timeout(LOADING)
             self.world = self.client.load_world(name, False)
@@ -209,6 +213,21 @@ class Connection:
                     self._manager.shut_down()
                 if self._before is not None:
                     self.world.apply_settings(self._before)
+
+
+def served_town(host: str, port: int, town: str) -> str:
+    """The town to plan routes in for a server: caldrive's own where it serves those, else the OpenDRIVE file of its map
+    of this name, as Town01 is for town01. Raises ValueError where it has none, RuntimeError where no server answers."""
+    if town.endswith(".xodr") or generated_town(town):
+        return town
+    connection = Connection(host, port)
+    try:
+        names = connection.map_names()
+        if town in TOWNS and town in names:
+            return town
+        return connection.town_of(next((name for name in names if name.lower() == town.lower()), town))
+    finally:
+        connection.close()
 
 
 def _release(version: str) -> list[str]:

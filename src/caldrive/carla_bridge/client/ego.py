@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from caldrive.carla_bridge.client.actors import Offset, forward_speed, place_of, transform_of
 from caldrive.carla_bridge.client.connection import Connection
 from caldrive.carla_bridge.client.sensors import CLOCK, COLLISION, Sensor, camera
@@ -71,9 +73,13 @@ class Ego:
         """m from its centre to its front axle; the embedded ego's share of the length where CARLA's wheels are not
         where wheels can be."""
         here, length = self._pose(), 2.0 * float(self._box.extent.x)
-        at = [(wheel.position.x / CM - self._offset[0], -wheel.position.y / CM - self._offset[1]) for wheel in self._wheels]
-        ahead = max((float(to_local(here, one)[0]) for one in at), default=0.0)
+        ahead = max((self._ahead(here, wheel.position) for wheel in self._wheels), default=0.0)
         return ahead if 0.2 * length < ahead < 0.5 * length else USUAL.front_axle / USUAL.length * length
+
+    def _ahead(self, here: Pose, position: Any) -> float:
+        """How far (m) ahead of a pose a wheel is."""
+        x, y = self._offset
+        return float(to_local(here, np.array((position.x / CM - x, -position.y / CM - y)))[0])
 
     def mount(self, mounts: Sequence[CameraConfig], *kinds: str) -> bool:
         """Mounts cameras where there are none; whether there are new ones, which see nothing before the next step."""
