@@ -34,8 +34,8 @@ class RunDescription(TypedDict):
     """What run.json says.
 
     suite_content, agent_source, controller_source: digests of files of one's own. world: None for the embedded one;
-    towns: the maps of another that stand for the suite's; host, port: where that was. model_file: the path of the network,
-    where it is not the package's. began: the time in UTC."""
+    towns: the maps of another that stand for the suite's; host, port: where that was. model_file: the path of the
+    network, where it is not the package's. began: the time in UTC."""
 
     suite: str
     suite_content: str | None

@@ -140,7 +140,7 @@ class Connection:
         with self.answers():
             settings = self.world.get_settings()
             self._before = self.world.get_settings()
-            if left := self._left_behind():
+            if left := self.left_behind():
                 self._remove(left)
                 self._before.synchronous_mode, self._before.fixed_delta_seconds = False, None
             settings.synchronous_mode, settings.fixed_delta_seconds = True, DT
@@ -149,7 +149,8 @@ class Connection:
             while self.time < BEGIN:  # the client asks for some steps of its own, and not always as many
                 self.tick()
 
-    def _left_behind(self) -> list[int]:
+    def left_behind(self) -> list[int]:
+        """What is there under our name, of this connection or of a process that was killed."""
         return [one.id for one in self.world.get_actors() if one.attributes.get("role_name") == OURS]
 
     @property

@@ -37,7 +37,8 @@ class Sensor:
         actor = connection.spawn(blueprint, place or connection.carla.Transform(), carrier)
         if actor is None:
             raise RuntimeError(f"found that CARLA makes no {kind}, wanted one on the ego: start another server")
-        self.kind, self.latest = kind, None
+        self.kind = kind
+        self.latest: Any = None
         self._heard: SimpleQueue[Any] = SimpleQueue()
         self._actor = actor
         self._actor.listen(self._heard.put)
