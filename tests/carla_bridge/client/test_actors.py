@@ -73,7 +73,7 @@ def test_a_vehicle_is_the_box_around_it_and_the_ego_is_none_of_the_others() -> N
     [(found, height)] = Actors(Server(vehicle=[bicycle, ego]), load_roads("town01"), ego=8).vehicles()  # type: ignore[arg-type]
     assert (found.pose.x, found.pose.y) == pytest.approx((10.0, 20.5))  # its box lies ahead of its origin
     assert (found.speed, found.length, found.width) == pytest.approx((3.0, 1.6, 0.5))
-    assert (found.id, height) == ("7", 0.0)
+    assert (found.id, height) == ("vehicle.bh.crossbike#7", 0.0)
 
 
 def test_a_person_on_the_road_is_on_it() -> None:

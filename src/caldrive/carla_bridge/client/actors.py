@@ -74,7 +74,7 @@ class Actors:
             pose = moved(place.pose, forward=box.location.x, left=-box.location.y)
             speed = forward_speed(actor.get_velocity(), pose.heading)
             length, width = 2 * box.extent.x, max(2 * box.extent.y, THINNEST)
-            found.append((VehicleState(pose, speed, length=length, width=width, id=str(actor.id)), place.z))
+            found.append((VehicleState(pose, speed, length=length, width=width, id=_name(actor)), place.z))
         return found
 
     def pedestrians(self) -> tuple[PedestrianState, ...]:
@@ -88,7 +88,7 @@ class Actors:
                 speed=forward_speed(actor.get_velocity(), place.heading),
                 radius=max(box.extent.x, box.extent.y),
                 on_road=on,
-                id=str(actor.id),
+                id=_name(actor),
             )
             for (actor, box, place), on in zip(people, on_road, strict=True)
         )
@@ -107,11 +107,15 @@ class Actors:
             other, impulse = hit.other_actor, hit.normal_impulse.length()
             kind = KINDS.get(other.type_id.partition(".")[0], ContactKind.OBJECT)
             place = place_of(other.get_transform(), self._roads.offset)
-            name = f"{other.type_id}#{other.id}"
+            name = _name(other)
             if name not in found or impulse > found[name].impulse:
                 fault = at_fault(ego, np.array((place.x, place.y)), kind)
                 found[name] = Contact(kind, name, impulse, at_fault=fault)
         return tuple(found.values())
+
+
+def _name(actor: Any) -> str:
+    return f"{actor.type_id}#{actor.id}"
 
 
 def _shown(light: Any) -> LightState:

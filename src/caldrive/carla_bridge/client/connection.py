@@ -109,6 +109,7 @@ class Connection:
                 raise ValueError(
                     f"found no map {name!r} on the server, wanted one of {', '.join(names)}: give another --town"
                 )
+            self._end_manager()  # it knows the old map
             self.client.set_timeout(LOADING)
             self.world = self.client.load_world(name, False)
             self.client.set_timeout(PATIENCE)
@@ -204,14 +205,18 @@ class Connection:
         if ids:
             self.client.apply_batch_sync([self.carla.command.DestroyActor(id) for id in ids], False)
 
+    def _end_manager(self) -> None:
+        manager, self._manager = self._manager, None
+        if manager is not None:
+            manager.set_synchronous_mode(False)
+            manager.shut_down()
+
     def close(self) -> None:
         """Removes all that was spawned and puts the settings back, if the server still hears it."""
         if self.is_alive():
             with suppress(RuntimeError):  # it has gone meanwhile, and all with it
                 self.clear()
-                if self._manager is not None:
-                    self._manager.set_synchronous_mode(False)
-                    self._manager.shut_down()
+                self._end_manager()
                 if self._before is not None:
                     self.world.apply_settings(self._before)
 

@@ -35,10 +35,8 @@ class Ego:
             )
         self.id = int(self._actor.id)
         self._box = self._actor.bounding_box
-        wheels = self._actor.get_physics_control().wheels
-        most = max((wheel.max_steer_angle for wheel in wheels), default=0.0) or math.degrees(USUAL.max_steer)
+        most = max((wheel.max_steer_angle for wheel in self._wheels()), default=0.0) or math.degrees(USUAL.max_steer)
         self._steer_share = min(1.0, USUAL.max_steer / math.radians(most))
-        self._wheels = wheels
         self._hits = Sensor(connection, self._actor, COLLISION)
         self._clock = Sensor(connection, self._actor, CLOCK)
         self._cameras: dict[tuple[CameraConfig, str], Sensor] = {}
@@ -55,8 +53,10 @@ class Ego:
         )
 
     def put(self, pose: Pose) -> None:
-        """It is somewhere else."""
-        self._actor.set_transform(self._transform(pose))
+        """It is somewhere else, as high as it was."""
+        place = self._transform(pose)
+        place.location.z = self._actor.get_transform().location.z
+        self._actor.set_transform(place)
 
     def state(self) -> VehicleState:
         """Where it is and how fast, after the latest step."""
@@ -73,8 +73,11 @@ class Ego:
         """m from its centre to its front axle; the embedded ego's share of the length where CARLA's wheels are not
         where wheels can be."""
         here, length = self._pose(), 2.0 * float(self._box.extent.x)
-        ahead = max((self._ahead(here, wheel.position) for wheel in self._wheels), default=0.0)
+        ahead = max((self._ahead(here, wheel.position) for wheel in self._wheels()), default=0.0)
         return ahead if 0.2 * length < ahead < 0.5 * length else USUAL.front_axle / USUAL.length * length
+
+    def _wheels(self) -> Any:
+        return self._actor.get_physics_control().wheels
 
     def _ahead(self, here: Pose, position: Any) -> float:
         """How far (m) ahead of a pose a wheel is."""
@@ -90,7 +93,7 @@ class Ego:
 
     def wait_for(self, frame: int) -> None:
         """Waits until everything has come that its sensors say of a frame."""
-        for sensor in (*self._cameras.values(), self._clock):  # the clock last: it speaks last
+        for sensor in (self._clock, *self._cameras.values()):  # each speaks after the collisions of its step
             sensor.wait_for(frame)
 
     def image(self, mount: CameraConfig, kind: str) -> Any:

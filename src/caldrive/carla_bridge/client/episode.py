@@ -28,11 +28,12 @@ class Episode:
         self, connection: Connection, town: Town, scenario: Scenario, route: Route, mounts: Sequence[CameraConfig]
     ) -> None:
         self.town, self.scenario, self.route, self._connection = town, scenario, route, connection
-        carla, roads, (first, _) = connection.carla, town.roads, route.lanes[0]
+        self._progress = 0.0
+        carla, roads, (first, begin) = connection.carla, town.roads, route.lanes[0]
         start = route.line.pose_at(0.0)
         with connection.answers():
             connection.world.set_weather(getattr(carla.WeatherParameters, weather(scenario.weather).name))
-            self._ego = Ego(connection, start, roads.lanes[first].height(0.0), roads.offset)
+            self._ego = Ego(connection, start, roads.lanes[first].height(-begin), roads.offset)
             self._ego.mount(mounts, RGB)
             populate(connection, scenario)
             for _ in range(SETTLE):
@@ -73,19 +74,19 @@ class Episode:
     def _update(self, contacts: tuple[Contact, ...]) -> None:
         """Takes down who is where now, and what is true of it."""
         ego = self._ego.state()
-        near = self.state.progress if hasattr(self, "state") else 0.0
-        progress = self.route.line.project(ego.pose.x, ego.pose.y, near=near).s
+        self._progress = self.route.line.project(ego.pose.x, ego.pose.y, near=self._progress).s
         self.state = WorldState(
-            time=round(self._connection.time - self._began, 6), ego=ego, vehicles=self._cars(progress),
-            pedestrians=self._actors.pedestrians(), lights=self._actors.lights(), contacts=contacts, progress=progress,
+            time=round(self._connection.time - self._began, 6), ego=ego, vehicles=self._cars(),
+            pedestrians=self._actors.pedestrians(), lights=self._actors.lights(), contacts=contacts,
+            progress=self._progress,
         )  # fmt: skip
         self.truth = self.labels.truth(self.state)
 
-    def _cars(self, progress: float) -> tuple[VehicleState, ...]:
+    def _cars(self) -> tuple[VehicleState, ...]:
         """All other cars but those on a bridge over the route, or below it."""
         level = self.labels.level
         return tuple(
             car
             for car, height in self._actors.vehicles()
-            if level is None or level.holds(car.pose.x, car.pose.y, height, progress)
+            if level is None or level.holds(car.pose.x, car.pose.y, height, self._progress)
         )
