@@ -65,7 +65,7 @@ def collect(
         _claim(folder, config)
         missing = list(_missing(config.episodes, folder, progress))
         if ray is None:
-            recorded = parallel_map(partial(_record, config, folder, world), missing, workers)
+            recorded = parallel_map(partial(_record, config, folder, world=world), missing, workers)
         else:
             recorded = _record_elsewhere(config, folder, missing, workers, ray)
         try:
@@ -89,7 +89,7 @@ def _missing(episodes: int, folder: Path, progress: Progress) -> Iterator[int]:
 
 
 @lru_cache(maxsize=1)
-def _world(settings: WorldSettings) -> RecordableWorld:
+def _world(settings: WorldSettings = EMBEDDED) -> RecordableWorld:
     """The world of this process. Raises ValueError where nothing can be recorded in it."""
     world = make_world(settings.world, **settings.address)
     if not is_recordable(world):
@@ -101,14 +101,14 @@ def _world(settings: WorldSettings) -> RecordableWorld:
     return world
 
 
-def _close_world(settings: WorldSettings) -> None:
+def _close_world(settings: WorldSettings = EMBEDDED) -> None:
     """Closes the world of this process, if an episode was recorded in it."""
     if _world.cache_info().currsize:
         _world(settings).close()
         _world.cache_clear()
 
 
-def _record(config: CollectConfig, folder: Path, world: WorldSettings, number: int) -> int:
+def _record(config: CollectConfig, folder: Path, number: int, world: WorldSettings = EMBEDDED) -> int:
     """What a worker does: records an episode, and returns its number of frames."""
     return record_episode(_world(world), config, number, folder)
 
@@ -130,7 +130,7 @@ def _record_bytes(config: CollectConfig, code: str, number: int) -> tuple[int, b
             f"found {code_version()} on a machine of the cluster, wanted {code}: install the same caldrive there"
         )
     with TemporaryDirectory() as folder:
-        frames = _record(config, Path(folder), EMBEDDED, number)
+        frames = _record(config, Path(folder), number)
         return frames, episode_path(Path(folder), number).read_bytes()
 
 

@@ -7,9 +7,10 @@ from typing import Any
 
 from caldrive.agents.registry import agent_entry
 from caldrive.agents.senses import with_senses
+from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import CameraConfig
 from caldrive.driving.own_code import truth_of
-from caldrive.driving.settings import DriverSettings, WorldSettings
+from caldrive.driving.settings import WorldSettings
 from caldrive.interfaces import Agent, World
 from caldrive.plugins import attribute, find_plugin
 
@@ -62,8 +63,9 @@ def _check_world(world: World, name: str) -> None:
         )
 
 
-def set_up(settings: DriverSettings, images: bool = False) -> tuple[World, Agent]:
-    """A world, and the agent for it. images: whether an agent that looks at none gets a camera, too.
+def set_up(settings: AgentSettings, images: bool = False) -> tuple[World, Agent]:
+    """A world, and the agent for it. settings: a `DriverSettings` says in which world, others mean the embedded one.
+    images: whether an agent that looks at none gets a camera, too.
 
     Raises ValueError for an unknown agent, controller or world, FileNotFoundError or ValueError for a model that is no
     use.
@@ -71,7 +73,8 @@ def set_up(settings: DriverSettings, images: bool = False) -> tuple[World, Agent
     entry = agent_entry(settings.agent)
     camera = entry.camera(settings) or (CameraConfig() if images else None)
     auxiliary = entry.auxiliary(settings)
-    world = make_world(settings.world, camera, **settings.address, **({"auxiliary": auxiliary} if auxiliary else {}))
+    where = settings if isinstance(settings, WorldSettings) else WorldSettings()
+    world = make_world(where.world, camera, **where.address, **({"auxiliary": auxiliary} if auxiliary else {}))
     try:
         knows = (lambda: truth_of(world)) if entry.privileged or settings.truth else None
         agent = entry.make(settings, world.dt, knows if entry.privileged else None)

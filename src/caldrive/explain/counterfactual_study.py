@@ -14,8 +14,8 @@ import numpy as np
 from PIL import Image as Picture
 from PIL import ImageDraw
 
+from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import Image, Observation
-from caldrive.driving.settings import DriverSettings
 from caldrive.driving.setup import set_up
 from caldrive.explain.cases import SITUATIONS, find_cases
 from caldrive.explain.counterfactuals import (
@@ -106,7 +106,7 @@ def _seen(
     network: Network, scenarios: Sequence[Scenario], *, cases: int, layer: str, seed: int, progress: Progress
 ) -> Iterator[Seen]:
     """The cases of all episodes as the network sees them, up to so many of each situation."""
-    world, agent = set_up(DriverSettings(agent="oracle"))
+    world, agent = set_up(AgentSettings(agent="oracle"))
     assert isinstance(world, EmbeddedWorld)
     counts = Counter[str]()
     with closing(world), closing(CameraRig(load_town(scenarios[0].town))) as rig:
