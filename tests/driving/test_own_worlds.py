@@ -62,7 +62,7 @@ def test_an_agent_of_ones_own_drives_in_it_twice_the_same(tmp_path: Path) -> Non
         (["--world", WORLD], "type --from X,Y --to X,Y"),
         (
             ["--world", "mars", "--from", "0,0", "--to", "9,0"],
-            "found world 'mars', wanted one of embedded, or your own class",
+            "found world 'mars', wanted one of embedded, carla, or your own class",
         ),
         (["--world", "{tmp}/own.py:Half", "--from", "0,0", "--to", "9,0"], "Half has no step, wanted a world with dt"),
         (["--world", WORLD, "--from", "0,zero", "--to", "9,0"], "found --from 0,zero, wanted X,Y or X,Y,HEADING"),
