@@ -134,24 +134,27 @@ class Connection:
                 return folder / name
         raise RuntimeError("found no folder to keep the map in, wanted one: set XDG_CACHE_HOME to a folder of yours")
 
-    def synchronise(self) -> None:
-        """Removes what an earlier drive left, and lets the server step when it is told to, from now on."""
+    def synchronise(self) -> int:
+        """Lets the server step when it is told to, from now on, and removes what an earlier drive left; returns how
+        many actors that were."""
         if self._before is not None:
-            return
+            return 0
         with self.answers():
-            settings = self.world.get_settings()
-            self._before = self.world.get_settings()
-            if left := self.left_behind():
-                self._remove(left)
-                self._before.synchronous_mode, self._before.fixed_delta_seconds = False, None
+            self._before, settings = self.world.get_settings(), self.world.get_settings()
             settings.synchronous_mode, settings.fixed_delta_seconds = True, DT
             settings.max_substeps, settings.max_substep_delta_time = SUBSTEPS, DT / SUBSTEPS
             self.world.apply_settings(settings)
+            self.tick()  # before it a server that a killed process left waiting shows nobody
+            if left := self.left_behind():
+                self._remove(left)
+                self._before.synchronous_mode, self._before.fixed_delta_seconds = False, None
+                self.tick()
             while self.time < BEGIN:  # the client asks for some steps of its own, and not always as many
                 self.tick()
+            return len(left)
 
     def left_behind(self) -> list[int]:
-        """What is there under our name, of this connection or of a process that was killed."""
+        """The numbers of what is there under our name, of this connection or of a process that was killed."""
         return [one.id for one in self.world.get_actors() if one.attributes.get("role_name") == OURS]
 
     @property

@@ -11,8 +11,7 @@ from caldrive.carla_bridge.client.connection import Connection
 
 def main() -> None:
     here = Connection("127.0.0.1", int(sys.argv[1]))
-    found: dict[str, object] = {"left": len(here.left_behind())}
-    here.synchronise()
+    found: dict[str, object] = {"left": here.synchronise()}
     found |= {"after": len(here.left_behind()), "delta": here.world.get_settings().fixed_delta_seconds}
     here.close()
     found["sync"] = here.world.get_settings().synchronous_mode
