@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
 
+from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.artifacts import EpisodeArtifacts
 from caldrive.benchmark.episode_metrics import EpisodeMetrics
 from caldrive.benchmark.generated_suites import GENERATED_SUITES
@@ -23,7 +24,6 @@ from caldrive.driving.own_code import OwnCodeError
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.rules import RULES
-from caldrive.driving.settings import DriverSettings
 from caldrive.driving.setup import planned_town, require_embedded, set_up
 from caldrive.files import locked_folder
 from caldrive.interfaces import Agent, World
@@ -39,19 +39,19 @@ from caldrive.world.traffic.start_places import free_places
 
 
 @lru_cache(maxsize=1)
-def _worker(driver: DriverSettings) -> tuple[World, Agent, dict[str, Any]]:
+def _worker(driver: AgentSettings) -> tuple[World, Agent, dict[str, Any]]:
     """One world, agent and provenance for each process."""
     return *set_up(driver), driver_provenance(driver)
 
 
-def _close_worker(driver: DriverSettings) -> None:
+def _close_worker(driver: AgentSettings) -> None:
     """Closes the world of this process, if a trial was driven in it."""
     if _worker.cache_info().currsize:
         _worker(driver)[0].close()
         _worker.cache_clear()
 
 
-def drive_trial(driver: DriverSettings, trial: Trial) -> EpisodeRecord:
+def drive_trial(driver: AgentSettings, trial: Trial) -> EpisodeRecord:
     """What a worker does: drives one trial, and returns all that is kept of it. Raises OwnCodeError with its key."""
     world, agent, provenance = _worker(driver)
     referee = make_referee(driver, trial)
@@ -65,7 +65,7 @@ def drive_trial(driver: DriverSettings, trial: Trial) -> EpisodeRecord:
     return EpisodeRecord(line=line, files=artifacts.files(trial.key, result), provenance=provenance)
 
 
-def make_referee(driver: DriverSettings, trial: Trial) -> Referee:
+def make_referee(driver: AgentSettings, trial: Trial) -> Referee:
     """A trial's referee. A driver without a cap is told to obey the signs."""
     return Referee(trial.scenario, trial.fatal, RULES[trial.rules], signs=driver.cap is None)
 
