@@ -9,12 +9,10 @@ is there drives by CARLA's traffic manager on one side and by SUMO on the other.
 
 from __future__ import annotations
 
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 
 import tyro
@@ -47,21 +45,14 @@ class Options:
 def served(port: int) -> Iterator[None]:
     """A server of the town while it is needed. Raises RuntimeError where it ends by itself."""
     command = [sys.executable, "-m", "caldrive", "serve-carla", "--town", TOWN, "--port", str(port)]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         try:
-            while not _listens(port + 1):
-                if process.poll() is not None:
-                    raise RuntimeError(f"found that the server ended with {process.returncode}, wanted it to serve")
-                time.sleep(0.5)
+            assert process.stderr is not None
+            if not any("may connect" in line for line in process.stderr):
+                raise RuntimeError("found that the server ended, wanted it to serve: type caldrive serve-carla")
             yield
         finally:
             process.terminate()
-
-
-def _listens(port: int) -> bool:
-    with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
-        return True
-    return False
 
 
 def drive(driver: DriverSettings, trials: list[Trial]) -> list[EpisodeResult]:
