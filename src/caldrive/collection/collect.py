@@ -50,10 +50,9 @@ def collect(
     """Records what is missing or damaged in a folder; yields (episode, frames) as they are done.
 
     ray: address of a cluster that records, as in `cluster_map`; None for processes of this machine. world: where it
-    drives; CARLA, which has one world, takes one worker, and its towns have one look. Where a worker
-    dies, new ones go on. Raises ValueError where the folder holds a recording with other settings, another process
-    records in it or a machine of the cluster has another caldrive, RuntimeError where workers die again and again or
-    Ray is missing.
+    drives; CARLA, which has one world, takes one worker, and its towns have one look. Where a worker dies, new ones go
+    on. Raises ValueError where the folder holds a recording with other settings, another process records in it or a
+    machine of the cluster has another caldrive, RuntimeError where workers die again and again or Ray is missing.
     """
     if world.world == "carla":
         config, workers = replace(config, town=planned_town(world, config.town), randomised=0.0), 1

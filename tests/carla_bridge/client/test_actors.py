@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -44,8 +45,6 @@ class Server:
         return self._actors.get(pattern.partition(".")[0], [])
 
     def answers(self) -> Any:
-        from contextlib import nullcontext
-
         return nullcontext()
 
 
