@@ -43,7 +43,8 @@ COMMANDS = {
     "speed agent": "--steps 3",
     "determinism": "--agent oracle --town town02 --seconds 1",
 }
-TAKE_DAYS = ("baselines", "serve-carla")  # trainings like those of the verb train; and what ends when it is stopped
+# Trainings like those of the verb train, what ends when it is stopped, and what needs a CARLA.
+TAKE_DAYS = ("baselines", "serve-carla", "check-carla")
 ERRORS = ("drive --wings 2", "drive --town mars", "report gone", "fly")
 
 

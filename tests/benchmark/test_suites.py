@@ -148,3 +148,10 @@ def test_a_scenario_that_cannot_be_is_refused(change: dict[str, Any], tmp_path: 
     (tmp_path / "own.json").write_text(json.dumps([rows[0] | {"scenario": rows[0]["scenario"] | change}]))
     with pytest.raises(ValueError, match=r"own\.json is no suite"):
         suite(str(tmp_path / "own.json"))
+
+
+def test_other_towns_stand_for_a_suites() -> None:
+    here, there = suite("quick"), suite("quick", towns={"town01": "town02"})
+    assert [trial.key for trial in there] == [trial.key for trial in here]
+    assert {trial.scenario.town for trial in there} == {"town02"}
+    assert here != there

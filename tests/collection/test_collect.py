@@ -19,6 +19,7 @@ from caldrive.collection import collect as collection
 from caldrive.collection.collect import _record, _record_bytes, collect
 from caldrive.collection.config import CollectConfig
 from caldrive.datatypes import Control
+from caldrive.driving.settings import WorldSettings
 from caldrive.files import locked_folder
 from caldrive.world.embedded import EmbeddedWorld
 from tests.parallel import fake_ray
@@ -182,12 +183,12 @@ def test_episodes_of_unknown_origin_are_not_added_to(tmp_path: Path) -> None:
         next(collect(TINY, tmp_path))
 
 
-def _dies_once(config: CollectConfig, folder: Path, number: int) -> int:
+def _dies_once(config: CollectConfig, folder: Path, number: int, world: WorldSettings) -> int:
     mark = folder / "died"
     if number == 1 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return _record(config, folder, number)
+    return _record(config, folder, number, world)
 
 
 def test_workers_that_die_are_replaced_and_the_recording_is_the_unbroken_one(

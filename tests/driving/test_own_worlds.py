@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tests.fakes
-from caldrive.agents.settings import AgentSettings
+from caldrive.driving.settings import DriverSettings
 from caldrive.driving.setup import make_world, set_up
 from caldrive.interfaces import is_mapped
 from caldrive.visualization.hud import CAMERA, SIZE
@@ -24,7 +24,7 @@ def test_a_world_is_closed_where_its_agent_cannot_be_made(monkeypatch: pytest.Mo
     closed = []
     monkeypatch.setattr(tests.fakes.StraightRoad, "close", lambda world: closed.append(world))
     with pytest.raises(ValueError, match="found controller 'wild'"):
-        set_up(AgentSettings(agent="oracle", controller="wild"), "tests.fakes:StraightRoad")
+        set_up(DriverSettings(agent="oracle", controller="wild", world="tests.fakes:StraightRoad"))
     assert len(closed) == 1
 
 
@@ -62,7 +62,7 @@ def test_an_agent_of_ones_own_drives_in_it_twice_the_same(tmp_path: Path) -> Non
         (["--world", WORLD], "type --from X,Y --to X,Y"),
         (
             ["--world", "mars", "--from", "0,0", "--to", "9,0"],
-            "found world 'mars', wanted one of embedded, or your own class",
+            "found world 'mars', wanted one of embedded, carla, or your own class",
         ),
         (["--world", "{tmp}/own.py:Half", "--from", "0,0", "--to", "9,0"], "Half has no step, wanted a world with dt"),
         (["--world", WORLD, "--from", "0,zero", "--to", "9,0"], "found --from 0,zero, wanted X,Y or X,Y,HEADING"),

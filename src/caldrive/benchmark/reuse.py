@@ -16,8 +16,8 @@ from caldrive.results import EpisodeResult, Outcome, result_from_values
 from caldrive.scenarios import Scenario
 
 SAME = (
-    "agent", "agent_source", "controller", "controller_source", "cap", "blind", "truth", "variant", "code", "model",
-    "precision",
+    "agent", "agent_source", "controller", "controller_source", "cap", "blind", "truth", "variant", "world", "code",
+    "model", "precision",
 )  # fmt: skip
 
 

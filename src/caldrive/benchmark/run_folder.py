@@ -19,7 +19,8 @@ from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.artifacts import read_trace_file, still_paths, trace_path
 from caldrive.benchmark.result_lines import append_line, has_lines, make_appendable, read_lines
 from caldrive.benchmark.settings import BenchmarkSettings
-from caldrive.benchmark.suites import SUITES, Trial, TrialResult, from_json, suite
+from caldrive.benchmark.suites import HERE, SUITES, Towns, Trial, TrialResult, from_json, suite
+from caldrive.driving.settings import DriverSettings
 from caldrive.files import read_json, write_whole
 from caldrive.provenance import code_version, machine_name
 from caldrive.results import result_from_values
@@ -32,8 +33,9 @@ RUN = "run.json"
 class RunDescription(TypedDict):
     """What run.json says.
 
-    suite_content, agent_source, controller_source: digests of files of one's own. model_file: the path of the network,
-    where it is not the package's. began: the time in UTC."""
+    suite_content, agent_source, controller_source: digests of files of one's own. world: None for the embedded one;
+    towns: the maps of another that stand for the suite's; host, port: where that was. model_file: the path of the
+    network, where it is not the package's. began: the time in UTC."""
 
     suite: str
     suite_content: str | None
@@ -45,6 +47,10 @@ class RunDescription(TypedDict):
     blind: NotRequired[list[str] | None]
     truth: NotRequired[list[str] | None]
     variant: NotRequired[str | None]
+    world: NotRequired[str | None]
+    towns: NotRequired[dict[str, str] | None]
+    host: NotRequired[str]
+    port: NotRequired[int]
     time_limit: str
     seed: int
     code: str
@@ -81,14 +87,18 @@ def suite_digest(path: Path, trials: Sequence[Trial]) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def run_identity(settings: BenchmarkSettings, trials: Sequence[Trial], driven_by: dict[str, Any]) -> dict[str, Any]:
-    """What a folder's results depend on. trials: the suite's; driven_by: the `driver_provenance` of this process."""
+def run_identity(
+    settings: BenchmarkSettings, trials: Sequence[Trial], driven_by: dict[str, Any], towns: Towns = HERE
+) -> dict[str, Any]:
+    """What a folder's results depend on. trials: the suite's; driven_by: the `driver_provenance` of this process;
+    towns: see `suite`."""
     own_suite, driver = Path(settings.suite) if settings.suite not in SUITES else None, settings.driver
     return {
         "suite": str(own_suite.resolve()) if own_suite else settings.suite,
         "suite_content": suite_digest(own_suite, trials) if own_suite else None,
         "agent": driver.agent, "controller": driver.controller, "cap": driver.cap,
         "blind": list(driver.blind) or None, "truth": list(driver.truth) or None, "variant": driver.variant,
+        "world": None if driver.world == "embedded" else driver.world, "towns": dict(towns) or None,
         "time_limit": settings.time_limit, "seed": settings.seed, **driven_by,
     }  # fmt: skip
 
@@ -102,10 +112,12 @@ class RunFolder:
         self.description: dict[str, Any] = _read_description(path)
 
     @classmethod
-    def claim(cls, settings: BenchmarkSettings, trials: list[Trial], driven_by: dict[str, Any]) -> RunFolder:
+    def claim(
+        cls, settings: BenchmarkSettings, trials: list[Trial], driven_by: dict[str, Any], towns: Towns = HERE
+    ) -> RunFolder:
         """The folder for settings' results, new or taken up again. trials: the suite's. Raises ValueError where it
         holds another run's."""
-        path, identity = settings.out, run_identity(settings, trials, driven_by)
+        path, identity = settings.out, run_identity(settings, trials, driven_by, towns)
         if not has_lines(path):  # what was tried here before, if anything, came to nothing
             _write_description(settings, identity)
         elif not (path / RUN).is_file():
@@ -122,11 +134,11 @@ class RunFolder:
         return folder
 
     @property
-    def driver(self) -> AgentSettings:
-        """Who drove."""
+    def driver(self) -> DriverSettings:
+        """Who drove, and in which world."""
         about = self.description
         model = Path(about["model_file"]) if about["model_file"] else None
-        return AgentSettings(
+        return DriverSettings(
             agent=about["agent"],
             model=model,
             controller=about["controller"],
@@ -134,6 +146,8 @@ class RunFolder:
             blind=tuple(about.get("blind") or ()),
             truth=tuple(about.get("truth") or ()),
             variant=about.get("variant"),
+            world=about.get("world") or "embedded",
+            **{name: about[name] for name in ("host", "port") if name in about},
         )
 
     @cached_property
@@ -142,7 +156,7 @@ class RunFolder:
         about = self.description
         if about["suite_content"] is not None:
             return _own_trials(Path(about["suite"]), about["suite_content"])
-        return suite(about["suite"], about["seed"], about["time_limit"])
+        return suite(about["suite"], about["seed"], about["time_limit"], about.get("towns") or HERE)
 
     def lines(self) -> dict[str, dict[str, Any]]:
         """The sound lines by trial, as `ResultLine`."""
@@ -194,7 +208,7 @@ def _write_description(settings: BenchmarkSettings, identity: dict[str, Any]) ->
     more = {
         "model_file": str(settings.model.resolve()) if settings.model else None,
         "began": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": machine_name(), "workers": settings.workers,
+        "machine": machine_name(), "workers": settings.workers, **settings.address,
     }  # fmt: skip
     write_whole(settings.out / RUN, (json.dumps(identity | more, indent=2) + "\n").encode())
 

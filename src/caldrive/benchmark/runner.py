@@ -14,22 +14,23 @@ from typing import Any
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.artifacts import EpisodeArtifacts
 from caldrive.benchmark.episode_metrics import EpisodeMetrics
+from caldrive.benchmark.generated_suites import GENERATED_SUITES
 from caldrive.benchmark.reuse import reusable_records
 from caldrive.benchmark.run_folder import EpisodeRecord, RunFolder, driver_provenance
 from caldrive.benchmark.settings import BenchmarkSettings
-from caldrive.benchmark.suites import SUITES, Trial, suite
+from caldrive.benchmark.suites import SUITES, Towns, Trial, suite
 from caldrive.checks import MOST_SEED, MOST_WORKERS, require_within, require_writable_folder
 from caldrive.driving.own_code import OwnCodeError
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.rules import RULES
-from caldrive.driving.setup import set_up
+from caldrive.driving.setup import planned_town, require_embedded, set_up
 from caldrive.files import locked_folder
 from caldrive.interfaces import Agent, World
 from caldrive.parallel.processes import parallel_map
 from caldrive.parallel.ray_cluster import cluster_map, require_ray
 from caldrive.results import plain, result_values
-from caldrive.scenarios import Scenario
+from caldrive.scenarios import TOWNS, Scenario
 from caldrive.world.roads.route import plan_route
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.weather import weather
@@ -88,10 +89,12 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[RunProgress]:
     workers keep dying or Ray is missing.
     """
     known = [RunFolder(folder) for folder in settings.known]
-    trials = _checked_trials(settings)
+    _check(settings)
+    towns = _towns(settings)
+    trials = _checked_trials(settings, towns)
     driven_by = driver_provenance(settings.driver)  # looks at agent and network before there is a folder
     with locked_folder(settings.out):
-        folder = RunFolder.claim(settings, trials, driven_by)
+        folder = RunFolder.claim(settings, trials, driven_by, towns)
         for record in reusable_records(known, folder.missing(), folder.description):
             folder.save(record)
         missing = folder.missing()
@@ -106,11 +109,12 @@ def benchmark(settings: BenchmarkSettings) -> Iterator[RunProgress]:
             _close_worker(settings.driver)
 
 
-def _checked_trials(settings: BenchmarkSettings) -> list[Trial]:
-    """The suite's trials. Refuses what no benchmark can be made of before a folder is claimed."""
+def _check(settings: BenchmarkSettings) -> None:
+    """Refuses what no benchmark can be made of before a folder is claimed, or a server asked."""
     require_within("--workers", settings.workers, 1, MOST_WORKERS, 2)
     require_within("--seed", settings.seed, 0, MOST_SEED, 0)
     if settings.ray is not None:
+        require_embedded(settings)
         require_ray()
     if settings.cap is not None:
         require_within("--cap", settings.cap, 1.0, 200.0, 20)
@@ -118,8 +122,25 @@ def _checked_trials(settings: BenchmarkSettings) -> list[Trial]:
         raise ValueError(
             f"found --seed or --time-limit with {settings.suite}, whose trials have their own: leave them out"
         )
+    if not settings.is_mapped:
+        raise ValueError(
+            f"found --world {settings.world}, wanted one with towns that the suites know: type --world embedded or "
+            "--world carla"
+        )
     require_writable_folder(settings.out)
-    trials = suite(settings.suite, settings.seed, settings.time_limit)
+
+
+def _towns(settings: BenchmarkSettings) -> dict[str, str]:
+    """The maps of CARLA's that stand for the suite's towns, where it drives there."""
+    if settings.world == "embedded" or settings.suite not in SUITES or settings.suite in GENERATED_SUITES:
+        return {}
+    towns = {town: planned_town(settings, town) for town in TOWNS}
+    return {town: place for town, place in towns.items() if place != town}
+
+
+def _checked_trials(settings: BenchmarkSettings, towns: Towns) -> list[Trial]:
+    """The suite's trials."""
+    trials = suite(settings.suite, settings.seed, settings.time_limit, towns)
     if settings.suite not in SUITES:
         _check_trials(settings.suite, trials)
     return trials
@@ -149,7 +170,7 @@ def _drive(
 ) -> Iterator[EpisodeRecord]:
     """The trials' records as they are done, by processes of this machine or by Ray's."""
     if settings.ray is None:
-        results = parallel_map(work, trials, settings.workers)
+        results = parallel_map(work, trials, 1 if settings.world == "carla" else settings.workers)
     else:
         results = cluster_map(work, trials, settings.workers, settings.ray)
     return (record for _, record in results)

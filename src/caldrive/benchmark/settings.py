@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from caldrive.agents.settings import AgentSettings
+from caldrive.driving.settings import DriverSettings
 from caldrive.plugins import full_name
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchmarkSettings(AgentSettings):
+class BenchmarkSettings(DriverSettings):
     """Drive a whole suite; what a folder holds already is kept, and the rest is driven."""
 
     suite: str = "quick"
@@ -22,7 +22,8 @@ class BenchmarkSettings(AgentSettings):
     known: tuple[Path, ...] = ()
     """Folders of other suites that the same agent drove; an episode that is among theirs is not driven again."""
     workers: int = 2
-    """Processes that drive at the same time, here or with --ray local; a cluster uses all its processors."""
+    """Processes that drive at the same time, here or with --ray local; a cluster uses all its processors. In CARLA,
+    which has one world, there is always one."""
     ray: str | None = None
     """Drive with Ray: local, auto for the cluster that this machine belongs to, or a cluster's address."""
     cap: float | None = 20.0
@@ -35,11 +36,11 @@ class BenchmarkSettings(AgentSettings):
     """Decides everything random: traffic, pedestrians, lights."""
 
     @property
-    def driver(self) -> AgentSettings:
+    def driver(self) -> DriverSettings:
         """Who drives, the same for processes that stand in other folders."""
-        own = {field.name: getattr(self, field.name) for field in fields(AgentSettings)}
+        own = {field.name: getattr(self, field.name) for field in fields(DriverSettings)}
         return replace(
-            AgentSettings(**own),
+            DriverSettings(**own),
             agent=full_name(self.agent),
             model=self.model.resolve() if self.model else None,
             controller=full_name(self.controller),

@@ -39,6 +39,8 @@ COLLISIONS = (InfractionKind.COLLISION_CAR, InfractionKind.COLLISION_OBJECT, Inf
 TRAFFIC_RULES = (*COLLISIONS, InfractionKind.RED_LIGHT, InfractionKind.OPPOSITE_LANE, InfractionKind.SIDEWALK)
 QUICK_ROUTES, QUICK_WEATHERS = 2, (1, 14)
 NOCRASH_SEEDS = 3  # its tables are means and deviations over so many
+Towns = Mapping[str, str]  # what stands for a suite's towns elsewhere, such as CARLA's maps; empty for themselves
+HERE: Towns = {}
 
 
 @dataclass(frozen=True)
@@ -87,11 +89,12 @@ def _seed(seed: int, weather: int) -> int:
     return 100 * seed + weather
 
 
-def _corl2017(seed: int, time_limit: str, routes: int = ROUTES_PER_TASK) -> Iterator[Trial]:
+def _corl2017(seed: int, time_limit: str, towns: Towns, routes: int = ROUTES_PER_TASK) -> Iterator[Trial]:
     """The CoRL-2017 benchmark: the four tasks in each condition and weather."""
     for condition, town, weather in _by_weather(NEW_WEATHERS):
         for task in TASKS:
-            chosen = task_scenarios(town, task, weather, seed=_seed(seed, weather), time_limit=time_limit)[:routes]
+            place = towns.get(town, town)
+            chosen = task_scenarios(place, task, weather, seed=_seed(seed, weather), time_limit=time_limit)[:routes]
             for k, scenario in enumerate(chosen):
                 yield Trial(key=f"{town}-w{weather:02d}-{task}-{k:02d}", condition=condition, scenario=scenario)
 
@@ -100,28 +103,28 @@ def _route(trial: Trial) -> int:
     return int(trial.key.rpartition("-")[2])
 
 
-def _corl2017_once(seed: int, time_limit: str) -> list[Trial]:
+def _corl2017_once(seed: int, time_limit: str, towns: Towns) -> list[Trial]:
     """Each route of each cell in one of its weathers, which take turns; the first of each cell before the second."""
 
     def is_its_turn(trial: Trial) -> bool:
         weathers = TRAINING_WEATHERS if CONDITIONS[trial.condition][1] else NEW_WEATHERS
         return trial.scenario.weather == weathers[_route(trial) % len(weathers)]
 
-    return sorted(filter(is_its_turn, _corl2017(seed, time_limit)), key=_route)
+    return sorted(filter(is_its_turn, _corl2017(seed, time_limit, towns)), key=_route)
 
 
-def _dynamic(seed: int, time_limit: str) -> list[Trial]:
+def _dynamic(seed: int, time_limit: str, towns: Towns) -> list[Trial]:
     """Of the CoRL-2017 benchmark what has cars and people: 100 km in town 1, 60 km in town 2."""
-    return [trial for trial in _corl2017(seed, time_limit) if trial.scenario.task == TASKS[-1]]
+    return [trial for trial in _corl2017(seed, time_limit, towns) if trial.scenario.task == TASKS[-1]]
 
 
-def _quick(seed: int, time_limit: str) -> list[Trial]:
+def _quick(seed: int, time_limit: str, towns: Towns) -> list[Trial]:
     """Some of the CoRL-2017 benchmark, in a few minutes."""
-    trials = _corl2017(seed, time_limit, QUICK_ROUTES)
+    trials = _corl2017(seed, time_limit, towns, QUICK_ROUTES)
     return [trial for trial in trials if trial.scenario.weather in QUICK_WEATHERS]
 
 
-def _nocrash(seed: int, fatal: tuple[InfractionKind, ...]) -> Iterator[Trial]:
+def _nocrash(seed: int, fatal: tuple[InfractionKind, ...], towns: Towns) -> Iterator[Trial]:
     """The NoCrash benchmark: its routes in each density of traffic, with infractions that end an episode, three times
     with other traffic."""
     for repetition in range(NOCRASH_SEEDS):
@@ -129,8 +132,8 @@ def _nocrash(seed: int, fatal: tuple[InfractionKind, ...]) -> Iterator[Trial]:
             for density, traffic in DENSITIES.items():
                 cars, people = traffic[town]
                 chosen = task_scenarios(
-                    town, "nocrash", weather, cars=cars, people=people, time_limit="nocrash", name=density,
-                    seed=_seed(NOCRASH_SEEDS * seed + repetition, weather),
+                    towns.get(town, town), "nocrash", weather, cars=cars, people=people, time_limit="nocrash",
+                    name=density, seed=_seed(NOCRASH_SEEDS * seed + repetition, weather),
                 )  # fmt: skip
                 for k, scenario in enumerate(chosen):
                     yield Trial(
@@ -147,22 +150,22 @@ def _require_own_time_limit(time_limit: str) -> None:
         )
 
 
-def _nocrash_suite(fatal: tuple[InfractionKind, ...]) -> Callable[[int, str], list[Trial]]:
-    def trials(seed: int, time_limit: str) -> list[Trial]:
+def _nocrash_suite(fatal: tuple[InfractionKind, ...]) -> Callable[[int, str, Towns], list[Trial]]:
+    def trials(seed: int, time_limit: str, towns: Towns) -> list[Trial]:
         _require_own_time_limit(time_limit)
-        return list(_nocrash(seed, fatal))
+        return list(_nocrash(seed, fatal, towns))
 
     return trials
 
 
-def _generated(name: str, seed: int, time_limit: str) -> list[Trial]:
+def _generated(name: str, seed: int, time_limit: str, towns: Towns) -> list[Trial]:
     """A suite of generated towns, which is one condition, by our own strict rules."""
     scenarios = generated_scenarios(name, seed, time_limit)
     return [Trial(key, name, scenario, rules="strict") for key, scenario in scenarios]
 
 
-SUITES: Mapping[str, Callable[[int, str], list[Trial]]] = {  # by name; of a seed and a kind of time limit
-    "corl2017": lambda seed, time_limit: list(_corl2017(seed, time_limit)),
+SUITES: Mapping[str, Callable[[int, str, Towns], list[Trial]]] = {  # by name; of a seed and a kind of time limit
+    "corl2017": lambda seed, time_limit, towns: list(_corl2017(seed, time_limit, towns)),
     "corl2017-once": _corl2017_once,
     "dynamic": _dynamic,
     "nocrash": _nocrash_suite(COLLISIONS),
@@ -172,14 +175,14 @@ SUITES: Mapping[str, Callable[[int, str], list[Trial]]] = {  # by name; of a see
 }
 
 
-def suite(name: str, seed: int = 0, time_limit: str = "paper") -> list[Trial]:
+def suite(name: str, seed: int = 0, time_limit: str = "paper", towns: Towns = HERE) -> list[Trial]:
     """A suite by its name, or from a JSON file by `to_json`.
 
-    time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s. Raises ValueError for an
-    unknown name and a file that is no suite.
+    time_limit: `paper` is the path at 10 km/h, `code` the authors' path at 5 km/h plus 10 s. towns: those
+    that stand for the suite's. Raises ValueError for an unknown name and a file that is no suite.
     """
     if name in SUITES:
-        return SUITES[name](seed, time_limit)
+        return SUITES[name](seed, time_limit, towns)
     if name.endswith(".json"):
         return from_json(Path(name))
     raise ValueError(f"found suite {name!r}, wanted {', '.join(SUITES)} or a .json file: type --suite quick")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,7 +18,8 @@ from typing import Any
 from caldrive.checks import MOST_PIXELS, MOST_SEED, MOST_WORKERS, Limits, require_limits
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.recorder import record_episode
-from caldrive.driving.setup import make_world
+from caldrive.driving.settings import WorldSettings
+from caldrive.driving.setup import make_world, planned_town, require_embedded
 from caldrive.files import locked_folder, write_whole
 from caldrive.interfaces import RecordableWorld, is_recordable
 from caldrive.parallel.processes import parallel_map
@@ -39,26 +40,31 @@ LIMITS: Limits = {  # of the options that are numbers
     "before_turns": (0.0, 1.0), "displaced": (0.0, 1.0), "randomised": (0.0, 1.0), "hidden_cars": (0.0, 1.0),
     "tailgating": (0.0, 1.0),
 }  # fmt: skip
+EMBEDDED = WorldSettings()
 
 
 def collect(
-    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent, ray: str | None = None
-) -> Iterator[tuple[int, int]]:
+    config: CollectConfig, folder: Path, workers: int = 1, progress: Progress = silent, ray: str | None = None,
+    world: WorldSettings = EMBEDDED,
+) -> Iterator[tuple[int, int]]:  # fmt: skip
     """Records what is missing or damaged in a folder; yields (episode, frames) as they are done.
 
-    ray: address of a cluster that records, as in `cluster_map`; None for processes of this machine. Where a worker
-    dies, new ones go on. Raises ValueError where the folder holds a recording with other settings, another process
-    records in it or a machine of the cluster has another caldrive, RuntimeError where workers die again and again or
-    Ray is missing.
+    ray: address of a cluster that records, as in `cluster_map`; None for processes of this machine. world: where it
+    drives; CARLA, which has one world, takes one worker, and its towns have one look. Where a worker dies, new ones go
+    on. Raises ValueError where the folder holds a recording with other settings, another process records in it or a
+    machine of the cluster has another caldrive, RuntimeError where workers die again and again or Ray is missing.
     """
+    if world.world == "carla":
+        config, workers = replace(config, town=planned_town(world, config.town), randomised=0.0), 1
     _check(config, workers)
     if ray is not None:
+        require_embedded(world)
         require_ray()
     with locked_folder(folder):
         _claim(folder, config)
         missing = list(_missing(config.episodes, folder, progress))
         if ray is None:
-            recorded = parallel_map(partial(_record, config, folder), missing, workers)
+            recorded = parallel_map(partial(_record, config, folder, world=world), missing, workers)
         else:
             recorded = _record_elsewhere(config, folder, missing, workers, ray)
         try:
@@ -66,7 +72,7 @@ def collect(
                 progress(f"recording, {done} of {config.episodes} episodes", done / config.episodes)
                 yield episode
         finally:
-            _close_world()
+            _close_world(world)
 
 
 def _missing(episodes: int, folder: Path, progress: Progress) -> Iterator[int]:
@@ -82,23 +88,28 @@ def _missing(episodes: int, folder: Path, progress: Progress) -> Iterator[int]:
 
 
 @lru_cache(maxsize=1)
-def _world() -> RecordableWorld:
-    """The world of this process."""
-    world = make_world()
-    assert is_recordable(world)
+def _world(settings: WorldSettings = EMBEDDED) -> RecordableWorld:
+    """The world of this process. Raises ValueError where nothing can be recorded in it."""
+    world = make_world(settings.world, **settings.address)
+    if not is_recordable(world):
+        world.close()
+        raise ValueError(
+            f"found that {settings.world} shows no images from places on the car, wanted a world that does: type "
+            "--world embedded or --world carla"
+        )
     return world
 
 
-def _close_world() -> None:
+def _close_world(settings: WorldSettings = EMBEDDED) -> None:
     """Closes the world of this process, if an episode was recorded in it."""
     if _world.cache_info().currsize:
-        _world().close()
+        _world(settings).close()
         _world.cache_clear()
 
 
-def _record(config: CollectConfig, folder: Path, number: int) -> int:
+def _record(config: CollectConfig, folder: Path, number: int, world: WorldSettings = EMBEDDED) -> int:
     """What a worker does: records an episode, and returns its number of frames."""
-    return record_episode(_world(), config, number, folder)
+    return record_episode(_world(world), config, number, folder)
 
 
 def _record_elsewhere(

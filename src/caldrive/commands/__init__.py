@@ -16,6 +16,7 @@ from tyro.conf import subcommand
 from caldrive.commands.answer import Answer
 from caldrive.commands.baselines import Baselines
 from caldrive.commands.benchmark import Benchmark, Replay, Report
+from caldrive.commands.check_carla import CheckCarla
 from caldrive.commands.collect import Collect, Convert, Data
 from caldrive.commands.drive import Determinism, Drive
 from caldrive.commands.explain import Blame, ExplainCounterfactuals, ExplainDrive, ExplainPictures, ExplainRecording
@@ -58,6 +59,7 @@ VERBS: Mapping[str, Verb] = {
     "tune": Verb(Tune, "Tune the controller: on a page with live signals, or by a search."),
     "see": Verb(See, "Run the network on your own video or pictures; it knows only the embedded towns."),
     "serve-carla": Verb(ServeCarla, "Let CARLA's client drive in the embedded world."),
+    "check-carla": Verb(CheckCarla, "Check whether a CARLA server is as caldrive needs it."),
     "town": Verb(Town, "Draw a town on one page, or its plan."),
     "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),
     "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),

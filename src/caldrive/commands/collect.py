@@ -11,18 +11,20 @@ from tyro.conf import arg
 
 from caldrive.collection.config import CollectConfig
 from caldrive.commands.answer import Answer, Configurable, Output
+from caldrive.driving.settings import WorldSettings
 from caldrive.progress import Progress
 
 
 @dataclass(frozen=True, kw_only=True)
-class Collect(Configurable):
+class Collect(WorldSettings, Configurable):
     """Record episodes that the oracle drives; what is there already is kept."""
 
     recording: Annotated[CollectConfig, arg(name="")] = field(default=CollectConfig(), metadata={"flat": True})
     out: Path = Path("out/recording")
     """Folder for the episodes."""
     workers: int = 2
-    """Processes that record at the same time, here or with --ray local; a cluster uses all its processors."""
+    """Processes that record at the same time, here or with --ray local; a cluster uses all its processors. In CARLA,
+    which has one world, there is always one."""
     ray: str | None = None
     """Record with Ray: local, auto for the cluster that this machine belongs to, or a cluster's address."""
 
@@ -36,7 +38,8 @@ class Collect(Configurable):
         from caldrive.recordings.writer import episode_path
 
         require_writable_folder(self.out)
-        for _ in collect(self.recording, self.out, self.workers, progress, self.ray):
+        world = WorldSettings(world=self.world, host=self.host, port=self.port)
+        for _ in collect(self.recording, self.out, self.workers, progress, self.ray, world):
             pass
         paths = (episode_path(self.out, k) for k in range(self.recording.episodes))
         counts = class_counts([read_episode(path, images=False) for path in paths])

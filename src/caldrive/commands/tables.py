@@ -19,6 +19,7 @@ from caldrive.results import EpisodeResult, Outcome, mean_speed
 if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.benchmark.metrics import Cell
     from caldrive.benchmark.suites import TrialResult
+    from caldrive.carla_bridge.client.checklist import Check
     from caldrive.driving.drive import DriveReport
     from caldrive.driving.speed import WorldTiming
     from caldrive.perception.evaluation.report import Report
@@ -219,3 +220,11 @@ def tuning_table(findings: Tuning, config: TuneConfig, page: Path, controller: P
         changes.add_row(name, old, new)
     drive = Text(f"drive: caldrive drive --controller {controller}")
     return Group(costs, changes, Text(f"report: {page}"), drive)
+
+
+def checks_table(checks: Sequence[Check]) -> Table:
+    """One row for each thing that was looked at."""
+    table = Table("what", "", "found", box=SIMPLE_HEAD)
+    for check in checks:
+        table.add_row(check.what, Text("ok" if check.ok else "not", "green" if check.ok else "red"), Text(check.found))
+    return table

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from caldrive.checks import MOST_SEED, require_within
 from caldrive.datatypes import KMH, Pose
 from caldrive.driving.settings import EpisodeSettings
+from caldrive.driving.setup import planned_town
 from caldrive.driving.tasks import task_scenarios
 from caldrive.scenarios import Scenario
 
@@ -25,6 +26,7 @@ def chosen_scenarios(settings: EpisodeSettings, n: int) -> list[Scenario]:
     Raises ValueError for numbers that cannot be, and for places away from any lane.
     """
     _check(settings, n)
+    settings = replace(settings, town=planned_town(settings, settings.town))
     chosen = [_own_scenario(settings)] * n if settings.start or settings.goal else _of_task(settings, n)
     if settings.seconds is None:
         return chosen
@@ -39,7 +41,7 @@ def _check(settings: EpisodeSettings, n: int) -> None:
     require_within("--seed", settings.seed, 0, MOST_SEED, 0)
     if settings.seconds is not None:
         require_within("--seconds", settings.seconds, 0.1, math.inf, 60)
-    if bool(settings.start) != bool(settings.goal) or (settings.world != "embedded" and not settings.start):
+    if bool(settings.start) != bool(settings.goal) or (not settings.is_mapped and not settings.start):
         places = [
             f"{option} {place}" for option, place in (("--from", settings.start), ("--to", settings.goal)) if place
         ]
@@ -77,7 +79,7 @@ def _own_scenario(settings: EpisodeSettings) -> Scenario:
     assert settings.start is not None
     assert settings.goal is not None
     begin, end = parse_place(settings.start, "--from"), parse_place(settings.goal, "--to")
-    if settings.world == "embedded":
+    if settings.is_mapped:
         start, goal, limit = _on_map(settings.town, begin, end)
     else:
         start, goal, limit = _beeline(begin, end)

@@ -66,7 +66,7 @@ def drive(settings: DriveSettings, progress: Progress = silent, attention: Atten
     _require_places(settings)
     scenarios = chosen_scenarios(settings, settings.episodes)
     show_truth = not agent_entry(settings.agent).privileged  # an oracle goes by the truth anyway
-    world, agent = set_up(settings, settings.world, images=settings.record is not None or settings.view)
+    world, agent = set_up(settings, images=settings.record is not None or settings.view)
     results, files = [], []
     with (
         closing(world),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
@@ -12,13 +12,40 @@ from caldrive.agents.settings import AgentSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class EpisodeSettings(AgentSettings):
-    """Who drives, and where."""
+class WorldSettings:
+    """In which world somebody drives."""
 
     world: str = "embedded"
-    """Where the agent drives: embedded, or your own: package.module:Class or file.py:Class."""
+    """Where the agent drives: embedded, carla (a server that runs), or your own: package.module:Class or
+    file.py:Class."""
+    host: str = "127.0.0.1"
+    """The machine where CARLA runs, for --world carla."""
+    port: int = 2000
+    """Its port."""
+
+    @property
+    def address(self) -> dict[str, Any]:
+        """What `make_world` has to know beside the world's name."""
+        return {"host": self.host, "port": self.port} if self.world == "carla" else {}
+
+    @property
+    def is_mapped(self) -> bool:
+        """Whether its towns can be looked up before it is there, to plan tasks in."""
+        return self.world in ("embedded", "carla")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriverSettings(WorldSettings, AgentSettings):
+    """Who drives, and in which world."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeSettings(DriverSettings):
+    """Who drives, and where."""
+
     town: str = "town01"
-    """town01, town02, random:SEED, random-wide:SEED or an OpenDRIVE file."""
+    """town01, town02, random:SEED, random-wide:SEED, an OpenDRIVE file, or with --world carla a map of the server's,
+    such as Town01."""
     task: str = "navigation"
     """straight, one-turn, navigation or navigation-dynamic."""
     weather: int = 1

@@ -81,7 +81,7 @@ def _checked(affordances: Sequence[str], out: Path) -> list[Question]:
 def _driven(settings: EpisodeSettings) -> Iterator[Scene]:
     """What the camera sees in an episode, until the referee ends it."""
     (scenario,) = chosen_scenarios(settings, 1)
-    world, agent = set_up(settings, settings.world, images=True)
+    world, agent = set_up(settings, images=True)
     with closing(world):
         referee = Referee(scenario, signs=settings.cap is None)
         for step in rollout(world, agent, scenario):

@@ -132,7 +132,7 @@ def _network(driver: AgentSettings) -> Network | None:
 def _snapshots(world: World, drive: Iterable[Step], glances: Sequence[Glance], span: int) -> Iterator[Snapshot]:
     """What is seen at some moments of a drive, each with the last `span` images; no more once the car is elsewhere than
     it was."""
-    assert is_recordable(world)  # a benchmark drives in the embedded world
+    assert is_recordable(world)  # both worlds of benchmarks are
     images, wanted = deque[Image](maxlen=span), {glance.step: glance for glance in glances}
     for number, step in enumerate(drive):
         images.append(step.observation.image)

@@ -49,12 +49,13 @@ def half_diagonal(box: VehicleState | Obstacle) -> float:
     return math.hypot(box.length, box.width) / 2
 
 
-def _at_fault(ego: VehicleState, touch: Points, obstacle: Obstacle) -> bool:
-    """The ego is at fault where its moving front or flank runs into something, not where it is run into."""
+def at_fault(ego: VehicleState, touch: Points, kind: ContactKind) -> bool:
+    """The ego is at fault where its moving front or flank runs into something, not where it is run into. touch: the
+    middle (2,) of what it touches."""
     x = float(to_local(ego.pose, touch)[0])
     if ego.speed < STANDING or x < 0:
-        return obstacle.kind is ContactKind.OBJECT
-    if obstacle.kind is ContactKind.PERSON:
+        return kind is ContactKind.OBJECT
+    if kind is ContactKind.PERSON:
         return bool(x > ego.length / 2 - BUMPER)
     return True
 
@@ -90,7 +91,7 @@ def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleSt
         normal = shift / depth
         impulse = _impulse(ego, obstacle, normal)
         touch = np.array([obstacle.pose.x, obstacle.pose.y])
-        contacts.append(Contact(obstacle.kind, obstacle.id, impulse, at_fault=_at_fault(ego, touch, obstacle)))
+        contacts.append(Contact(obstacle.kind, obstacle.id, impulse, at_fault=at_fault(ego, touch, obstacle.kind)))
         ego = _pushed(ego, obstacle, shift, impulse)
     return ego, tuple(contacts)
 

@@ -1,0 +1,1 @@
+"""The agents drive in CARLA, through its official client."""

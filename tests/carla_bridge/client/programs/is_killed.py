@@ -1,0 +1,13 @@
+"""Begins an episode, and ends like a process that is killed."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from caldrive.carla_bridge.client.world import CarlaWorld
+from tests.carla_bridge.client.programs.drives import AHEAD, ROUTE
+
+if __name__ == "__main__":
+    CarlaWorld(AHEAD, port=int(sys.argv[1])).reset(ROUTE)
+    os._exit(9)
