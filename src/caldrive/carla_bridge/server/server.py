@@ -32,6 +32,7 @@ from caldrive.world.town import load_town
 if TYPE_CHECKING:  # it needs what draws
     from caldrive.carla_bridge.server.run_recording import RunRecording
 
+FIRST_FRAME = 1  # a client that waits for its first snapshot passes over a frame 0
 FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
 GRACE = 1.0  # s after a call until the clock begins to move the world: time to ask for synchronous mode
 LONGEST_GRACE = 5.0  # s after the first call
@@ -44,7 +45,7 @@ class Server:
     def __init__(self, settings: ServerSettings, recording: RunRecording | None = None) -> None:
         self.settings, self.maps, self._recording = settings, Maps(settings.maps), recording
         self._rules: dict[int, Settings] = {}  # of the clients that set some, the latest last
-        self.frame, self._episodes, self._numbers = 0, 0, count(1)
+        self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
         self.managers: dict[int, tuple[str, int]] = {}
         """Traffic managers that clients run: port to host and owner."""
         self.calls: dict[str, Call] = {}
@@ -139,7 +140,7 @@ class Server:
 
     def _result(self, caller: int, request: Request) -> Any:
         """What a call gives. A fault of the program costs one call, not all clients."""
-        if self.frame == 0 and not self.rules.synchronous:
+        if self.frame == FIRST_FRAME and not self.rules.synchronous:
             now = time.monotonic()
             self._first_call = min(self._first_call, now)
             self._next_step = min(now + GRACE, self._first_call + LONGEST_GRACE)
@@ -159,7 +160,7 @@ class Server:
             del self._rules[client]
             self._next_step = time.monotonic()
         if not self.clients:  # who comes next finds what the first one found
-            self.frame, self._episodes, self._numbers = 0, 0, count(1)
+            self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
             self._rules.clear()
             self._first_call = self._next_step = math.inf
             self.begin(self.settings.town)
