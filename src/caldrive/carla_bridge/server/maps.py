@@ -13,7 +13,7 @@ from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.datatypes import Pose
 from caldrive.scenarios import TOWNS
 from caldrive.world.roads.network import RoadNetwork
-from caldrive.world.roads.opendrive import read_map
+from caldrive.world.roads.opendrive import flat, read_map
 from caldrive.world.roads.opendrive_roads import opendrive_roads
 from caldrive.world.roads.opendrive_signals import MapSign, edge_of
 from caldrive.world.roads.opendrive_writer import write_opendrive
@@ -58,9 +58,10 @@ class Maps:
 
 @lru_cache(maxsize=2)
 def opendrive(town: str, roads: RoadNetwork) -> str:
-    """The OpenDRIVE of a town: its own file, or one that is written. Raises Refusal where none can be."""
+    """The OpenDRIVE of a town: its own file, as flat as the world is, or one that is written. Raises Refusal where none
+    can be."""
     if town.endswith(".xodr"):
-        return Path(town).read_text()
+        return flat(Path(town).read_bytes()).decode()
     try:
         return write_opendrive(roads).decode()
     except ValueError as error:

@@ -75,6 +75,10 @@ class Server:
     def _begin(self, town_name: str) -> Episode:
         """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
         town = load_town(town_name)
+        if town.roads.offset != (0.0, 0.0):
+            raise ValueError(
+                f"found that {town_name} lies far from the origin of its map, wanted one within 5 km: move the map"
+            )
         self._episodes += 1
         episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads), self._numbers)
         if self._senses.town is not town:

@@ -38,6 +38,15 @@ def read_map(content: bytes) -> OpenDriveMap:
     return OpenDriveMap(ET.tostring(root), signals, offset, dropped + signals.dropped)
 
 
+def flat(content: bytes) -> bytes:
+    """A map without its hills. Raises ValueError with the reason where it is none."""
+    root = parse_xml(content)
+    for road in root.findall("road"):
+        for profile in [*road.findall("elevationProfile"), *road.findall("lateralProfile")]:
+            road.remove(profile)
+    return ET.tostring(root)
+
+
 def _move_to_origin(root: ET.Element) -> tuple[float, float]:
     """Moves a map that lies far away: pictures are reckoned in numbers of seven digits. Returns by how much (m)."""
     pieces = root.findall("road/planView/geometry")
