@@ -99,6 +99,18 @@ def test_the_clients_traffic_manager_and_crowd_drive_and_walk(server: subprocess
     assert max(found["walkers"]) > 2.0
 
 
+def test_a_route_planner_and_an_agent_find_their_way_on_the_map(server: subprocess.Popen[bytes]) -> None:
+    found = run("planner")
+    assert found["edges"] > 100
+    assert found["broken"] == 0
+    assert found["reached"] == 1.0  # from every lane to every other
+    assert found["lights"] == 36
+    assert found["driven"] > 100.0
+    assert found["off"] < 0.8
+    assert found["red"] > 0
+    assert found["bumps"] == 0
+
+
 def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server: subprocess.Popen[bytes]) -> None:
     for k in range(5):
         with start("cameras") as process:

@@ -61,6 +61,10 @@ class Listener:
         self.sensor, self._queue = sensor, queue.Queue[Any]()
         sensor.listen(self._queue.put)
 
+    def waiting(self) -> int:
+        """How many messages nobody has asked for."""
+        return self._queue.qsize()
+
     def at(self, frame: int) -> Any:
         """What it says at a frame."""
         while True:
