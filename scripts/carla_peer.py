@@ -42,9 +42,9 @@ class Options:
 
 
 @contextmanager
-def served(port: int) -> Iterator[None]:
+def served(port: int, *more: str) -> Iterator[None]:
     """A server of the town while it is needed. Raises RuntimeError where it ends by itself."""
-    command = [sys.executable, "-m", "caldrive", "serve-carla", "--town", TOWN, "--port", str(port)]
+    command = [sys.executable, "-m", "caldrive", "serve-carla", "--town", TOWN, "--port", str(port), *more]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None

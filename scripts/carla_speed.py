@@ -1,0 +1,112 @@
+"""How many steps a second CARLA's client gets of `serve-carla`, beside the embedded world itself.
+
+    python -m scripts.carla_speed --cars 20 --size 200 88
+
+The same town, as many cars and as large a picture, in turns, so that a busy machine is as busy for both. A step is a
+control, a tick, and the picture that belongs to it.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, replace
+from statistics import median
+from typing import Any
+
+import tyro
+
+from caldrive.datatypes import CameraConfig, Control
+from caldrive.driving.tasks import task_scenarios
+from caldrive.provenance import machine_name
+from caldrive.world.embedded import EmbeddedWorld
+from scripts.carla_peer import TOWN, served
+
+PATIENCE = 60.0  # s for a picture
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is measured."""
+
+    cars: int = 20
+    """Cars that SUMO drives."""
+    size: tuple[int, int] = (200, 88)
+    """Of the picture, pixels."""
+    steps: int = 100
+    """In a turn."""
+    turns: int = 7
+    """Of each side."""
+    port: int = 2000
+    """Of the server that is started."""
+
+
+def embedded_step(world: EmbeddedWorld, cars: int) -> Callable[[], Any]:
+    """A step of the embedded world."""
+    scenario = task_scenarios(TOWN, "navigation", weather=1)[0]
+    world.reset(replace(scenario, n_vehicles=cars, n_pedestrians=0))
+    return lambda: world.step(Control(throttle=0.4))
+
+
+def client_step(options: Options) -> Callable[[], Any]:
+    """A step through CARLA's client."""
+    import carla
+
+    world = carla.Client("127.0.0.1", options.port).get_world()
+    settings = world.get_settings()
+    settings.synchronous_mode, settings.fixed_delta_seconds = True, 0.1
+    world.apply_settings(settings)
+    library, pictures = world.get_blueprint_library(), queue.Queue[Any]()
+    spawned = (
+        world.try_spawn_actor(library.find("vehicle.seat.leon"), point) for point in world.get_map().get_spawn_points()
+    )
+    car = next(actor for actor in spawned if actor is not None)
+    blueprint = library.find("sensor.camera.rgb")
+    for name, value in zip(("image_size_x", "image_size_y"), options.size, strict=True):
+        blueprint.set_attribute(name, str(value))
+    camera = world.spawn_actor(blueprint, carla.Transform(carla.Location(x=1.44, z=1.2)), car)
+    camera.listen(pictures.put)
+
+    def step() -> None:
+        car.apply_control(carla.VehicleControl(throttle=0.4))
+        frame = world.tick()
+        while pictures.get(timeout=PATIENCE).frame != frame:
+            assert camera.is_listening  # it would fall silent without a name
+
+    return step
+
+
+def steps_a_second(step: Callable[[], Any], steps: int) -> float:
+    """By the clock on the wall."""
+    begin = time.perf_counter()
+    for _ in range(steps):
+        step()
+    return steps / (time.perf_counter() - begin)
+
+
+def main() -> None:
+    """Measures, and prints medians."""
+    options = tyro.cli(Options, description=__doc__)
+    width, height = options.size
+    with (
+        served(options.port, "--cars", str(options.cars)),
+        closing(EmbeddedWorld(CameraConfig(width=width, height=height))) as world,
+    ):
+        sides = embedded_step(world, options.cars), client_step(options)
+        for step in sides:
+            steps_a_second(step, 20)
+        turns = [[steps_a_second(step, options.steps) for step in sides] for _ in range(options.turns)]
+    embedded, client = (median(turn[k] for turn in turns) for k in (0, 1))
+    share = median(there / here for here, there in turns)
+    print(f"{machine_name()}, {width} x {height}, {options.cars} cars, medians of {options.turns} turns:")
+    print(f"embedded {embedded:.0f} steps/s, through the client {client:.0f} steps/s, share {share:.2f}")
+    sys.stdout.flush()
+    os._exit(0)  # the wheel may crash where Python takes it down while its threads still run
+
+
+if __name__ == "__main__":
+    main()
