@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 
 import carla
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from tests.carla_bridge.server.programs.session import Listener, connect, run, spawned, straight, synchronous
 
 SIZE = {"image_size_x": "96", "image_size_y": "64"}
-TICKS = 12
+TICKS = int(sys.argv[2]) if len(sys.argv) > 2 else 12
 
 
 def main() -> None:
