@@ -137,18 +137,12 @@ class RunFolder:
     def driver(self) -> DriverSettings:
         """Who drove, and in which world."""
         about = self.description
-        model = Path(about["model_file"]) if about["model_file"] else None
         return DriverSettings(
-            agent=about["agent"],
-            model=model,
-            controller=about["controller"],
-            cap=about["cap"],
-            blind=tuple(about.get("blind") or ()),
-            truth=tuple(about.get("truth") or ()),
-            variant=about.get("variant"),
-            world=about.get("world") or "embedded",
-            **{name: about[name] for name in ("host", "port") if name in about},
-        )
+            agent=about["agent"], model=Path(about["model_file"]) if about["model_file"] else None,
+            controller=about["controller"], cap=about["cap"], blind=tuple(about.get("blind") or ()),
+            truth=tuple(about.get("truth") or ()), variant=about.get("variant"),
+            world=about.get("world") or "embedded", **{name: about[name] for name in ("host", "port") if name in about},
+        )  # fmt: skip
 
     @cached_property
     def trials(self) -> list[Trial]:
