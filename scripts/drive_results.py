@@ -2,20 +2,22 @@
 
     python -m scripts.drive_results [--only unseen/oracle nocrash] [--workers 2] [--keep]
 
-A run that was stopped goes on; an episode that one suite shares with another is driven once. `--keep` drives nothing
-and keeps what is there. The HTML reports stay in out/results.
+A run that was stopped goes on, also on another machine from the lines that are kept; an episode that one suite shares
+with another is driven once. `--keep` drives nothing and keeps what is there. The HTML reports stay in out/results.
 """
 
 from __future__ import annotations
 
 import argparse
 import gzip
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from caldrive.files import write_whole
+from caldrive.provenance import code_version
 
 OUT, KEPT = Path("out/results"), Path(__file__).parents[1] / "docs" / "results"
 ORACLE = ["--agent", "oracle"]
@@ -49,11 +51,25 @@ def chosen(only: list[str]) -> Iterator[tuple[str, str]]:
 
 def drive(suite: str, driver: str, workers: str) -> None:
     """Drives a suite, or what is left of it."""
+    for name in (suite, *KNOWN.get(suite, ())):
+        take_up(name, driver)
     known = [OUT / other / driver for other in KNOWN.get(suite, ()) if (OUT / other / driver).exists()]
     words = ["benchmark", "--suite", suite, *SUITES[suite][driver], "--workers", workers]
     words += ["--out", str(OUT / suite / driver), *(["--known", *map(str, known)] if known else [])]
     print("caldrive", *words, flush=True)
     subprocess.run([sys.executable, "-m", "caldrive", *words], check=True)
+
+
+def take_up(suite: str, driver: str) -> None:
+    """Unpacks the lines that are kept of a run of today's code, where there is no folder of it."""
+    kept, folder = KEPT / suite / driver, OUT / suite / driver
+    if folder.exists() or not (kept / "run.json").exists():
+        return
+    run = (kept / "run.json").read_bytes()
+    if json.loads(run)["code"] == code_version():
+        folder.mkdir(parents=True)
+        write_whole(folder / "results.jsonl", gzip.decompress((kept / "results.jsonl.gz").read_bytes()))
+        write_whole(folder / "run.json", run)
 
 
 def keep(suite: str, drivers: list[str]) -> None:
