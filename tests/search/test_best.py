@@ -37,7 +37,9 @@ def test_whole_trials_come_before_pruned_ones_and_the_better_first() -> None:
     assert [trial.draw for trial in ranked("hazard_stop", TRIALS)] == [3, 5, 0, 1, 4, 2]
 
 
-def test_the_best_of_both_kinds_are_trained_again_beside_the_best() -> None:
+def test_as_many_are_trained_again_with_history_as_without() -> None:
+    trials = [*TRIALS, trial(6, 0.85, length=1), trial(7, 0.95, length=1)]
+    assert [trial.draw for trial in candidates("relative_angle", trials, 2)] == [4, 1, 6, 3]
     assert [trial.draw for trial in candidates("relative_angle", TRIALS, 2)] == [4, 1, 3]
     assert [trial.draw for trial in candidates("hazard_stop", TRIALS, 1)] == [3, 5]
     assert [trial.draw for trial in candidates("hazard_stop", TRIALS[:1], 3)] == [0]

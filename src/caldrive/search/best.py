@@ -1,7 +1,7 @@
 """The best blocks of a search, trained again: of many trials the best was lucky, too.
 
-Of each task the best few are trained again with several seeds, and with them the best block with history and the best
-without, for the supplement's comparison. Their scores are those on all held-out frames, and their mean counts.
+Of each task the best few with history and as many without are trained again with several seeds, so that neither side of
+the supplement's comparison has more tries. Their scores are those on all held-out frames, and their mean counts.
 """
 
 from __future__ import annotations
@@ -67,10 +67,10 @@ def ranked(task: str, trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
 
 
 def candidates(task: str, trials: Sequence[FinishedTrial], n: int) -> list[FinishedTrial]:
-    """The best n trials, the best with history and the best without, each once, the best first."""
+    """The best n trials with history and the best n without, the best first."""
     order = ranked(task, trials)
-    of_kind = [next((trial for trial in order if trial.block.temporal == kind), None) for kind in (True, False)]
-    chosen = {trial.draw for trial in (*order[:n], *of_kind) if trial is not None}
+    kinds = ([trial for trial in order if trial.block.temporal == kind] for kind in (True, False))
+    chosen = {trial.draw for of_kind in kinds for trial in of_kind[:n]}
     return [trial for trial in order if trial.draw in chosen]
 
 

@@ -53,7 +53,8 @@ class SearchConfig:
     """Share of the episodes that is held out, for a recording that the network has not learnt from. 0: those that its
     training held out."""
     best: int = 3
-    """Blocks of each task that are trained again with other seeds: of many trials the best was lucky, too."""
+    """Blocks of each task, with history and without, that are trained again with other seeds: of many trials the best
+    was lucky, too."""
     seeds: int = 3
     """Seeds with which each of them is trained."""
     joint_steps: int = 3000

@@ -49,7 +49,7 @@ def _sections(findings: Findings, config: SearchConfig) -> Iterable[str]:
     yield "## The best blocks, beside the supplement's"
     yield _best_blocks(findings)
     yield (
-        "The best trials of each task, and the best with and without history, trained again with "
+        f"The best {config.best} trials of each task with history, and as many without, trained again with "
         f"{config.seeds} seeds, on all frames that are compared; mean and standard deviation. The score in the search "
         "is that of the best of many trials, on fewer frames: it flatters."
     )
