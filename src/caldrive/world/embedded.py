@@ -7,30 +7,25 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.datatypes import DT, Affordances, Alternative, CameraConfig, Control, Image, Observation, Truth
+from caldrive.datatypes import CameraConfig, Image, Observation
 from caldrive.scenarios import Scenario
-from caldrive.timing import Stopwatch, Timed, untimed
+from caldrive.timing import Stopwatch, untimed
 from caldrive.world.episode import Episode
+from caldrive.world.episode_world import EpisodeWorld
 from caldrive.world.rendering.camera import CameraRig, SceneState
-from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.route import Route, plan_route
 from caldrive.world.scene.weather import weather
 from caldrive.world.town import Town, load_town
 from caldrive.world.traffic.ego import VehicleConfig
 
-NO_IMAGE = np.zeros((1, 1, 3), np.uint8)  # a black pixel
 
-
-class EmbeddedWorld:
+class EmbeddedWorld(EpisodeWorld[Episode]):
     """A town with traffic, pedestrians, lights and cameras; implements `RecordableWorld`.
 
     camera: the agent's; None drives without images (a black pixel stands for them), for the oracle. vehicle: the ego.
     stopwatch: to measure the parts of a step with. auxiliary: a second camera, for an agent that asks for one. A
     process may have several worlds, but only one of them traffic.
     """
-
-    dt = DT
-    """s of one step."""
 
     def __init__(
         self,
@@ -39,9 +34,8 @@ class EmbeddedWorld:
         stopwatch: Stopwatch | None = None,
         auxiliary: CameraConfig | None = None,
     ) -> None:
-        self.mount, self.auxiliary, self.vehicle = camera, auxiliary, vehicle or VehicleConfig()
-        self._timed: Timed = stopwatch.part if stopwatch else untimed
-        self._episode: Episode | None = None
+        super().__init__(camera, auxiliary, stopwatch.part if stopwatch else untimed)
+        self.vehicle = vehicle or VehicleConfig()
         self._rig: CameraRig | None = None
 
     def reset(self, scenario: Scenario, *, route: Route | None = None, appearance: int = 0) -> Observation:
@@ -62,15 +56,6 @@ class EmbeddedWorld:
             self.close()  # without its first image there is no episode
             raise
 
-    def step(self, control: Control) -> Observation:
-        """Moves everything on by dt."""
-        self._current.step(control)
-        return self._observe()
-
-    def truth(self) -> Truth:
-        """What really is, now."""
-        return self._current.truth
-
     def close(self) -> None:
         """Ends the simulation and frees the camera."""
         if self._episode is not None:
@@ -79,30 +64,9 @@ class EmbeddedWorld:
         self._close_camera()
 
     @property
-    def _current(self) -> Episode:
-        if self._episode is None:
-            raise RuntimeError("found a world before its first episode, wanted one: call reset(scenario)")
-        return self._episode
-
-    @property
     def town(self) -> Town:
         """Where the episode is."""
         return self._current.town
-
-    @property
-    def roads(self) -> RoadNetwork:
-        """The town's."""
-        return self._current.town.roads
-
-    @property
-    def route(self) -> Route:
-        """From the start to the goal of the episode."""
-        return self._current.route
-
-    def displace(self, left: float, turn: float) -> Observation:
-        """Puts the ego some metres to the left and turns it (rad)."""
-        self._current.displace(left, turn)
-        return self._observe()
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
         """What cameras on the ego see now, (H, W, 3) each."""
@@ -111,14 +75,6 @@ class EmbeddedWorld:
     def semantic_images(self, mounts: Sequence[CameraConfig]) -> list[NDArray[np.uint8]]:
         """What each pixel of `images` shows, (H, W) each, as numbers of `Semantic`."""
         return self._camera().render_semantics(self.scene(), mounts)
-
-    def labels_at(self, mount: CameraConfig) -> Affordances:
-        """The affordances of a car that stands where this camera of the ego looks from (the three-camera set-up)."""
-        return self._current.labels.label_at(mount, self._current.state)
-
-    def other_commands_at(self, mount: CameraConfig) -> list[Alternative]:
-        """What other commands would ask of such a car, where others could be given."""
-        return self._current.labels.other_commands_at(mount, self._current.state)
 
     def scene(self) -> SceneState:
         """What `images` shows now, beside the town."""
@@ -144,13 +100,3 @@ class EmbeddedWorld:
         if self._rig is not None:
             self._rig.close()
         self._rig = None
-
-    def _observe(self) -> Observation:
-        state = self._current.state
-        with self._timed("camera"):
-            image = self.images([self.mount])[0] if self.mount is not None else NO_IMAGE
-            aside = self.images([self.auxiliary])[0] if self.auxiliary is not None else None
-        return Observation(
-            time=state.time, image=image, speed=state.ego.speed, command=self.route.command_at(state.progress),
-            auxiliary=aside,
-        )  # fmt: skip

@@ -10,24 +10,20 @@ from numpy.typing import NDArray
 from caldrive.carla_bridge.client.connection import Connection
 from caldrive.carla_bridge.client.episode import Episode
 from caldrive.carla_bridge.client.sensors import RGB, SEMANTIC, classes, picture
-from caldrive.datatypes import DT, Affordances, Alternative, CameraConfig, Control, Image, Observation, Truth
+from caldrive.datatypes import CameraConfig, Image, Observation
 from caldrive.scenarios import Scenario
-from caldrive.world.embedded import NO_IMAGE
-from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.episode_world import EpisodeWorld
 from caldrive.world.roads.route import Route, plan_route
 from caldrive.world.scene.weather import weather
 from caldrive.world.town import load_town
 
 
-class CarlaWorld:
+class CarlaWorld(EpisodeWorld[Episode]):
     """A CARLA server as a `RecordableWorld`, at 10 Hz in synchronous mode.
 
     camera: the agent's; None drives without images. auxiliary: a second one. A server has one world: who drives in it
-    has it alone.
+    has it alone. `displace` takes a step of the world.
     """
-
-    dt = DT
-    """s of one step."""
 
     def __init__(
         self,
@@ -36,9 +32,9 @@ class CarlaWorld:
         port: int = 2000,
         auxiliary: CameraConfig | None = None,
     ) -> None:
-        self.mount, self.auxiliary, self._host, self._port = camera, auxiliary, host, port
+        super().__init__(camera, auxiliary)
+        self._host, self._port = host, port
         self._connection: Connection | None = None
-        self._episode: Episode | None = None
 
     def reset(self, scenario: Scenario, *, route: Route | None = None, appearance: int = 0) -> Observation:
         """Starts an episode; connects anew where the server has been started anew. appearance: is not heeded, as
@@ -70,41 +66,11 @@ class CarlaWorld:
         connection.synchronise()
         return connection
 
-    def step(self, control: Control) -> Observation:
-        """Moves everything on by dt."""
-        self._current.step(control)
-        return self._observe()
-
-    def truth(self) -> Truth:
-        """What really is, now."""
-        return self._current.truth
-
     def close(self) -> None:
         """Removes what was spawned, and puts the server's settings back."""
         connection, self._connection, self._episode = self._connection, None, None
         if connection is not None:
             connection.close()
-
-    @property
-    def _current(self) -> Episode:
-        if self._episode is None:
-            raise RuntimeError("found a world before its first episode, wanted one: call reset(scenario)")
-        return self._episode
-
-    @property
-    def roads(self) -> RoadNetwork:
-        """The town's."""
-        return self._current.town.roads
-
-    @property
-    def route(self) -> Route:
-        """From the start to the goal of the episode."""
-        return self._current.route
-
-    def displace(self, left: float, turn: float) -> Observation:
-        """Puts the ego some metres to the left and turns it (rad), which takes a step."""
-        self._current.displace(left, turn)
-        return self._observe()
 
     def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
         """What cameras on the ego see now, (H, W, 3) each. The first look from a place takes a step of the world."""
@@ -114,20 +80,3 @@ class CarlaWorld:
         """What each pixel of `images` shows, (H, W) each, as numbers of `Semantic`."""
         self._current.mount(mounts, RGB, SEMANTIC)  # at once, so that both see the same
         return [classes(image) for image in self._current.look(mounts, SEMANTIC)]
-
-    def labels_at(self, mount: CameraConfig) -> Affordances:
-        """The affordances of a car that stands where this camera of the ego looks from."""
-        return self._current.labels.label_at(mount, self._current.state)
-
-    def other_commands_at(self, mount: CameraConfig) -> list[Alternative]:
-        """What other commands would ask of such a car, where others could be given."""
-        return self._current.labels.other_commands_at(mount, self._current.state)
-
-    def _observe(self) -> Observation:
-        state = self._current.state
-        image = self.images([self.mount])[0] if self.mount is not None else NO_IMAGE
-        aside = self.images([self.auxiliary])[0] if self.auxiliary is not None else None
-        return Observation(
-            time=state.time, image=image, speed=state.ego.speed, command=self.route.command_at(state.progress),
-            auxiliary=aside,
-        )  # fmt: skip
