@@ -37,7 +37,7 @@ COMMANDS = {
     "explain drive": "--seconds 0.3 --out attention.mp4",
     "explain pictures": "labels.png --out seen.mp4",
     "explain recording": "recording --examples 1 --out attention.png",
-    "explain counterfactuals": "--episodes 1 --seconds 2 --cases 1 --out counterfactuals.png",
+    "explain counterfactuals": "--episodes 1 --seconds 2 --cases 1 --out counterfactuals",
     "town": "--town town02 --plan plan.png",
     "speed world": "--town town02 --steps 3",
     "speed agent": "--steps 3",

@@ -6,7 +6,7 @@ import fcntl
 import io
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import is_dataclass
 from glob import escape
@@ -128,3 +128,21 @@ def _lock(file: int, folder: Path) -> None:
         raise ValueError(
             f"found another process at work in {folder}, wanted the folder alone: wait for it, or give another --out"
         ) from error
+
+
+def claim_folder(path: Path, wanted: Mapping[str, Any], kind: str) -> None:
+    """Writes what long work depends on into a file of its folder. kind: of the work, in words. Raises ValueError where
+    what is there depends on something else."""
+    if not path.is_file():
+        write_whole(path, json.dumps(wanted, indent=1).encode())
+        return
+    try:
+        found = read_json(path.read_bytes(), dict[str, Any])
+    except ValueError as error:
+        raise ValueError(f"found that {path} is damaged ({error}), wanted {kind}'s: give another --out") from error
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise ValueError(
+                f"found in {path.parent} {kind} with {name} {found.get(name)}, wanted {value}: type the same "
+                "settings as before, or another --out"
+            )

@@ -1,8 +1,8 @@
-"""A study from end to end: a short drive, and what cannot be studied."""
+"""A study from end to end: short drives, a study that goes on, and what cannot be studied."""
 
 from __future__ import annotations
 
-import io
+import shutil
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +16,13 @@ from caldrive.datatypes import CameraConfig, LightState, VehicleState
 from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.settings import EpisodeSettings
 from caldrive.explain.cases import Case
-from caldrive.explain.counterfactual_study import Study, sheet, study
+from caldrive.explain.counterfactual_episode import StudyConfig, episode_path, shown_before
+from caldrive.explain.counterfactual_study import study
 from caldrive.explain.counterfactuals import Studio, see
 from caldrive.explain.gradcam import Question
 from caldrive.explain.interventions import INTERVENTIONS
-from caldrive.perception.inference.predictor import NetworkPerception
+from caldrive.files import write_whole
+from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.network.network import Network
 from caldrive.perception.network.tensor_file import write_tensors
 from caldrive.world.embedded import EmbeddedWorld
@@ -54,42 +56,59 @@ def test_pictures_are_those_that_the_world_would_have_shown(network: Network, no
     assert green.before.probability != green.after.probability
 
 
-def test_a_study_of_a_short_drive_gives_the_same_twice(network: Network, no_sumo_left: None) -> None:
-    scenarios = chosen_scenarios(EpisodeSettings(task="navigation-dynamic", people=60, cars=3, seconds=5.0), 1)
+@pytest.fixture
+def config(network: Network, tmp_path: Path) -> StudyConfig:
+    """Two short episodes, asked of a network that has learnt nothing."""
+    path = tmp_path / "network.safetensors"
+    save_network(path, network, CheckpointInfo(network.config))
+    settings = EpisodeSettings(task="navigation-dynamic", people=60, cars=3, seconds=5.0)
+    return StudyConfig(path, tuple(chosen_scenarios(settings, 2)), cases=2, layer="coarse", seed=3)
 
-    def once() -> tuple[Study, bytes]:
-        found = study(network, NetworkPerception(network, watchdog=False), scenarios, cases=1, layer="coarse", seed=3)
-        return replace(found, shown={}), sheet(found.shown)
 
-    found, page = once()
-    assert (found, page) == once()
+def test_a_study_that_was_killed_goes_on_to_the_same_end(
+    config: StudyConfig, tmp_path: Path, no_sumo_left: None
+) -> None:
+    found = study(config, tmp_path / "whole")
     assert len(found.findings) == 7
     assert found.gap.cases == sum(n for n, _ in found.found.values()) > 0
     assert found.gap.other_answers == 0
-    assert found.gap.difference == pytest.approx(0.0, abs=1e-5)
-    with Picture.open(io.BytesIO(page)) as opened:
+    assert found.gap.difference == pytest.approx(0.0, abs=0.01)  # bf16 where the processor has it
+    with Picture.open(found.sheet) as opened:
         assert np.asarray(opened).shape[2] == 3
+    half = tmp_path / "half"
+    shutil.copytree(found.sheet.parent, half)
+    episode_path(half, 1).unlink()
+    (half / "sheet.png").unlink()
+    kept = episode_path(half, 0).stat().st_mtime_ns
+    other = study(config, half)
+    assert episode_path(half, 0).stat().st_mtime_ns == kept
+    assert replace(other, sheet=found.sheet) == found
+    assert other.sheet.read_bytes() == found.sheet.read_bytes()
+
+
+def test_a_folder_holds_one_study_and_a_damaged_file_is_named(config: StudyConfig, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    for k in range(2):
+        write_whole(episode_path(out, k), b"{}")
+    study(config, out)
+    with pytest.raises(ValueError, match=r"a study with seed 3, wanted 4: .* another --out"):
+        study(replace(config, seed=4), out)
+    write_whole(episode_path(out, 1), b'{"changes": 1}')
+    with pytest.raises(ValueError, match=r"0001.json is damaged .*: remove it"):
+        study(config, out)
+
+
+def test_the_first_example_is_shown_whoever_was_faster(config: StudyConfig, tmp_path: Path) -> None:
+    write_whole(episode_path(tmp_path, 1), b'{"rows": {"red light: the lamp is green": ""}}')
+    assert shown_before(tmp_path, 0) == set()
+    assert shown_before(tmp_path, 2) == {"red light: the lamp is green"}
 
 
 def test_the_command_answers_with_effects_and_verdicts(tmp_path: Path, no_sumo_left: None) -> None:
-    out = tmp_path / "sheet.png"
-    answer = run_json(
-        "explain",
-        "counterfactuals",
-        "--episodes",
-        "1",
-        "--seconds",
-        "1.5",
-        "--cars",
-        "0",
-        "--people",
-        "5",
-        "--cases",
-        "1",
-        "--out",
-        str(out),
-    )
-    assert out.is_file()
+    out = tmp_path / "study"
+    words = f"--episodes 1 --seconds 1.5 --cars 0 --people 5 --cases 1 --workers 1 --out {out}"
+    answer = run_json("explain", "counterfactuals", *words.split())
+    assert (out / "sheet.png").is_file()
     assert {"found", "effects", "observations", "at_the_wheel"} < answer.keys()
     assert {one["verdict"] for one in answer["observations"]} == {"too few cases"}
 
@@ -98,7 +117,7 @@ def test_the_command_answers_with_effects_and_verdicts(tmp_path: Path, no_sumo_l
     ("options", "sentence"),
     [
         (("--weather", "15"), "found --weather 15, wanted 1 to 14"),
-        (("--out", "x.jpg"), "wanted a name that ends in .png"),
+        (("--workers", "0"), "found --workers 0"),
         (("--cases", "0"), "found --cases 0, wanted 1 to 1000"),
         (("--episodes", "0"), "found --episodes 0, wanted 1 to 1000"),
         (("--town", "nowhere"), "nowhere"),

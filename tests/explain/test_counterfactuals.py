@@ -7,7 +7,7 @@ import pytest
 
 from caldrive.datatypes import Pose, VehicleState
 from caldrive.explain.cases import SITUATIONS, Case
-from caldrive.explain.counterfactuals import Counterfactual, different, effects, interval, says
+from caldrive.explain.counterfactuals import Change, Counterfactual, different, effects, interval, says
 from caldrive.explain.gradcam import Question, Reply
 from caldrive.explain.interventions import INTERVENTIONS, interventions_in
 from caldrive.world.rendering.camera import SceneState
@@ -44,9 +44,10 @@ def test_an_effect_is_the_mean_over_cases_with_the_answers_that_flip() -> None:
     change = INTERVENTIONS[0]
     blank = np.zeros((2, 2, 3), np.uint8)
 
-    def changed(episode: int, before: float, after: float, now: float) -> Counterfactual:
+    def changed(episode: int, before: float, after: float, now: float) -> tuple[int, Change]:
         replies = probability(before), probability(after), probability(now)
-        return Counterfactual(case("red light", episode), change, *replies, different(blank, blank), blank)
+        one = Counterfactual(case("red light", episode), change, *replies, different(blank, blank), blank)
+        return episode, one.summary
 
     found = [changed(0, 0.9, 0.1, 0.8), changed(1, 0.7, 0.6, 0.2)]
     (effect,) = effects(found)

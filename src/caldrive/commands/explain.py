@@ -158,37 +158,33 @@ class ExplainCounterfactuals(Output):
     """The network, a .safetensors file; without it the one in the package."""
     layer: Literal["coarse", "fine"] = "coarse"
     """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
-    out: Path = Path("out/counterfactuals.png")
-    """The sheet, a PNG file."""
+    workers: int = 2
+    """Episodes that are driven at the same time."""
+    out: Path = Path("out/counterfactuals")
+    """Folder for what is found in each episode, and the sheet of examples, sheet.png."""
 
     def run(self, progress: Progress) -> Answer:
         """Drives and changes; answers with the effects and the verdicts."""
         from caldrive.agents.rows import model_path
-        from caldrive.checks import require_within, require_writable_file
+        from caldrive.checks import require_within
         from caldrive.commands.explain_tables import study_table
-        from caldrive.explain.counterfactual_study import sheet, study
+        from caldrive.explain.counterfactual_episode import StudyConfig
+        from caldrive.explain.counterfactual_study import study
         from caldrive.explain.gradcam import require_captum
-        from caldrive.files import write_whole
-        from caldrive.perception.inference.predictor import NetworkPerception
-        from caldrive.perception.network.checkpoint import load_network
+        from caldrive.perception.network.checkpoint import read_info
 
-        require_writable_file(self.out, "--out", ".png")
         require_within("--cases", self.cases, 1, 1000, 40)
         require_captum()  # before the drive, not after it
         path = model_path(self.model)
-        network, _ = load_network(path)
-        scenarios = self.scenarios()
-        at_the_wheel = NetworkPerception(path, threads=1, watchdog=False)
-        found = study(
-            network, at_the_wheel, scenarios, cases=self.cases, layer=self.layer, seed=self.seed, progress=progress
-        )
-        write_whole(self.out, sheet(found.shown))
+        read_info(path)  # likewise: whether it is a network
+        config = StudyConfig(path, tuple(self.scenarios()), self.cases, self.layer, self.seed)
+        found = study(config, self.out, self.workers, progress)
         values = {
-            "out": str(self.out), "found": found.found, "effects": [asdict(one) for one in found.effects],
+            "sheet": str(found.sheet), "found": found.found, "effects": [asdict(one) for one in found.effects],
             "observations": [asdict(one) | {"verdict": one.verdict} for one in found.findings],
             "at_the_wheel": asdict(found.gap),
         }  # fmt: skip
-        return Answer(values, study_table(found, self.out))
+        return Answer(values, study_table(found))
 
     def scenarios(self) -> list[Scenario]:
         """What is driven: the dynamic task's routes in turn. Raises ValueError for numbers that cannot be."""

@@ -50,7 +50,7 @@ def attention_table(figures: Sequence[Figures], out: Path) -> Group:
     return Group(table, Text(note), said)
 
 
-def study_table(study: Study, out: Path) -> Group:
+def study_table(study: Study) -> Group:
     """The effect of each change, the verdict on each of the paper's observations, and where the sheet is."""
     missed = [f"{name}: {found - right} of {found}" for name, (found, right) in study.found.items() if found > right]
     gap = study.gap
@@ -60,7 +60,7 @@ def study_table(study: Study, out: Path) -> Group:
         f"left out, as the network saw them wrong: {', '.join(missed) or 'none'}",
         f"at the wheel, in 8-bit integers, {gap.other_answers} of {gap.cases} answers are other ones; probabilities "
         f"differ by {gap.difference:.3f} on average",
-        f"sheet: {out}",
+        f"sheet: {study.sheet}",
     ]
     return Group(_effect_table(study.effects), _finding_table(study.findings), *map(Text, notes))
 

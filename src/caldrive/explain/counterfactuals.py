@@ -92,6 +92,24 @@ class Seen:
 
 
 @dataclass(frozen=True)
+class Change:
+    """What one change changes in one case: scores (a probability, or a distance in m) and whether the answer flips."""
+
+    situation: str
+    name: str
+    control: bool
+    """Whether it should change nothing."""
+    before: float
+    after: float
+    """With the change in all frames that the network looks at."""
+    now: float
+    """With the change in the present frame alone."""
+    flips: bool
+    """Whether the answer is another one: yes or no, or the number on a sign."""
+    flips_now: bool
+
+
+@dataclass(frozen=True)
 class Counterfactual:
     """What a network says of a case, and of the same with a change."""
 
@@ -116,6 +134,16 @@ class Counterfactual:
     def change(self) -> float:
         """By how much the probability rises, or the distance in m."""
         return score(self.after) - score(self.before)
+
+    @property
+    def summary(self) -> Change:
+        """The same as numbers."""
+        before = says(self.case, self.before)
+        return Change(
+            self.intervention.situation, self.intervention.name, self.intervention.control,
+            score(self.before), score(self.after), score(self.after_now),
+            says(self.case, self.after) != before, says(self.case, self.after_now) != before,
+        )  # fmt: skip
 
 
 def see(studio: Studio, case: Case) -> Seen:
@@ -189,24 +217,21 @@ class Effect:
     flipped_now: int
 
 
-def effects(found: Sequence[Counterfactual], seed: int = 0) -> list[Effect]:
-    """One for each change."""
-    by_change: dict[Intervention, list[Counterfactual]] = {}
-    for one in found:
-        by_change.setdefault(one.intervention, []).append(one)
-    return [_effect(change, members, seed) for change, members in by_change.items()]
+def effects(found: Sequence[tuple[int, Change]], seed: int = 0) -> list[Effect]:
+    """One for each change. found: with their episodes."""
+    by_change: dict[tuple[str, str, bool], list[tuple[int, Change]]] = {}
+    for episode, one in found:
+        by_change.setdefault((one.situation, one.name, one.control), []).append((episode, one))
+    return [_effect(members, seed) for members in by_change.values()]
 
 
-def _effect(change: Intervention, found: Sequence[Counterfactual], seed: int) -> Effect:
-    before, after, now = (
-        [score(reply) for reply in replies]
-        for replies in zip(*((one.before, one.after, one.after_now) for one in found), strict=True)
-    )
+def _effect(found: Sequence[tuple[int, Change]], seed: int) -> Effect:
+    changes, first = [one for _, one in found], found[0][1]
+    before, after, now = (mean(getattr(one, name) for one in changes) for name in ("before", "after", "now"))
     return Effect(
-        change.situation, change.name, change.control, len(found), len({one.case.episode for one in found}),
-        before=mean(before), after=mean(after), difference=mean(after) - mean(before),
-        interval=interval([(one.case.episode, one.change) for one in found], seed),
-        flipped=sum(says(one.case, one.after) != says(one.case, one.before) for one in found),
-        difference_now=mean(now) - mean(before),
-        flipped_now=sum(says(one.case, one.after_now) != says(one.case, one.before) for one in found),
+        first.situation, first.name, first.control, len(found), len({episode for episode, _ in found}),
+        before=before, after=after, difference=after - before,
+        interval=interval([(episode, one.after - one.before) for episode, one in found], seed),
+        flipped=sum(one.flips for one in changes), difference_now=now - before,
+        flipped_now=sum(one.flips_now for one in changes),
     )  # fmt: skip

@@ -71,6 +71,11 @@ class Intervention:
     of_other: bool = False
     """Whether it is done to a thing of the same kind that is of no concern."""
 
+    @property
+    def key(self) -> str:
+        """Tells it from all others."""
+        return f"{self.situation}: {self.name}"
+
     def thing(self, case: Case) -> str | None:
         """The id of what is changed, None where a case has no such thing."""
         return case.other if self.of_other else case.subject

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-
-from caldrive.files import read_json, write_whole
 
 JOURNAL = "journal.log"
 
@@ -37,24 +34,6 @@ def require_optuna() -> Any:
         raise RuntimeError("found no Optuna, wanted it for a search: type pip install 'caldrive[search]'") from error
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna
-
-
-def claim_folder(path: Path, wanted: Mapping[str, Any]) -> None:
-    """Writes what a search's trials depend on into a file of its folder. Raises ValueError where the trials that are
-    there depend on something else."""
-    if not path.is_file():
-        write_whole(path, json.dumps(wanted, indent=1).encode())
-        return
-    try:
-        found = read_json(path.read_bytes(), dict[str, Any])
-    except ValueError as error:
-        raise ValueError(f"found that {path} is damaged ({error}), wanted a search's: give another --out") from error
-    for name, value in wanted.items():
-        if found.get(name) != value:
-            raise ValueError(
-                f"found in {path.parent} a search with {name} {found.get(name)}, wanted {value}: type the same "
-                "settings as before, or another --out"
-            )
 
 
 def mend_journal(out: Path) -> None:

@@ -10,10 +10,10 @@ from typing import TypeVar
 
 from caldrive.affordances import BY_NAME, CONDITIONAL
 from caldrive.checks import MOST_WORKERS, require_within, require_writable_folder
-from caldrive.files import locked_folder
+from caldrive.files import claim_folder, locked_folder
 from caldrive.parallel.processes import parallel_map
 from caldrive.parallel.ray_cluster import cluster_map, require_ray
-from caldrive.parallel.trials import claim_folder, mend_journal, require_optuna
+from caldrive.parallel.trials import mend_journal, require_optuna
 from caldrive.perception.network.checkpoint import load_network
 from caldrive.perception.network.config import BlockConfig, Conditioning
 from caldrive.progress import Progress, silent
@@ -104,7 +104,8 @@ def search(config: SearchConfig, source: Source, workers: Workers, progress: Pro
     with locked_folder(source.out):
         try:
             parts = checked_parts(source, config)
-            claim_folder(source.out / SETTINGS, config.decisive() | {"features": [part.digest for part in parts]})
+            about = config.decisive() | {"features": [part.digest for part in parts]}
+            claim_folder(source.out / SETTINGS, about, "a search")
             make_features(source, parts, progress)
             mend_journal(source.out)
             _run_trials(config, source, workers, progress)

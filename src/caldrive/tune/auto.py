@@ -18,9 +18,9 @@ from typing import Any
 
 from caldrive.checks import MOST_WORKERS, require_within, require_writable_folder
 from caldrive.control.controller import ControlConfig
-from caldrive.files import locked_folder
+from caldrive.files import claim_folder, locked_folder
 from caldrive.parallel.processes import parallel_map
-from caldrive.parallel.trials import Draw, abandon, claim_folder, finished, mend_journal, open_journal, require_optuna
+from caldrive.parallel.trials import Draw, abandon, finished, mend_journal, open_journal, require_optuna
 from caldrive.progress import Progress, silent
 from caldrive.provenance import code_version
 from caldrive.tune.config import TuneConfig
@@ -64,9 +64,8 @@ def tune(
     require_within("--workers", workers, 1, MOST_WORKERS, 2)
     require_writable_folder(out)
     with locked_folder(out):
-        claim_folder(
-            out / SETTINGS, config.decisive() | {"code": code_version(), "controller": _changed_values(controller)}
-        )
+        about = {"code": code_version(), "controller": _changed_values(controller)}
+        claim_folder(out / SETTINGS, config.decisive() | about, "a search")
         mend_journal(out)
         missing = missing_trials(out, config)
         work, total = partial(run_trial, out, config, controller), config.trials
