@@ -30,8 +30,8 @@ def controllers(ultimate: Ultimate) -> Iterator[tuple[str, ControlConfig]]:
     yield "default", default
     for rule in RULES:
         law = default.longitudinal
-        gains = {name: proposed(rule, ultimate, getattr(law, name)) for name in ("cruise", "follow")}
-        yield rule, replace(default, longitudinal=replace(law, **gains))
+        cruise, follow = (proposed(rule, ultimate, gains) for gains in (law.cruise, law.follow))
+        yield rule, replace(default, longitudinal=replace(law, cruise=cruise, follow=follow))
     yield "the paper's controller, all constants", controller_config("paper", None)
 
 

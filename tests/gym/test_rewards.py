@@ -18,14 +18,14 @@ from caldrive.datatypes import (
     Truth,
     VehicleState,
 )
-from caldrive.gym.rewards import PRESETS, Moment, wanted_speed
+from caldrive.gym.rewards import PRESETS, Transition, wanted_speed
 
 START = Truth(time=0.0, ego=VehicleState(Pose(0, 0, 0), 5.0, length=4.2), affordances=Affordances())
 STILL = Control()
 
 
 def rewards(preset: str, before: Truth, now: Truth, *, steer: float = 0.0, broke: bool = False) -> dict[str, float]:
-    return PRESETS[preset].rewards(Moment(before, now, STILL, Control(steer=steer), broke), {})
+    return PRESETS[preset].rewards(Transition(before, now, STILL, Control(steer=steer), broke), {})
 
 
 def test_the_papers_reward_is_a_point_a_metre_and_takes_two_for_the_whole_car_on_the_sidewalk() -> None:
@@ -69,5 +69,5 @@ def test_the_wanted_speed_falls_to_nothing_before_cars_people_and_red_lights() -
 
 
 def test_weights_can_be_changed() -> None:
-    moment = Moment(START, replace(START, route_done=2.0), STILL, STILL, broke=False)
-    assert PRESETS["carla2017"].rewards(moment, {"distance": 500.0})["distance"] == pytest.approx(1.0)
+    transition = Transition(START, replace(START, route_done=2.0), STILL, STILL, broke=False)
+    assert PRESETS["carla2017"].rewards(transition, {"distance": 500.0})["distance"] == pytest.approx(1.0)

@@ -8,7 +8,7 @@ import pytest
 
 from caldrive.progress import silent
 from caldrive.search.examples import Source, checked_parts, make_features
-from caldrive.search.run import Findings, Workers, search
+from caldrive.search.run import SearchResult, Workers, search
 from tests.search.data import TINY_SEARCH, make_source
 
 
@@ -21,7 +21,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Source:
 
 
 @pytest.fixture(scope="session")
-def searched(tmp_path_factory: pytest.TempPathFactory, source: Source) -> tuple[Source, Findings]:
+def searched(tmp_path_factory: pytest.TempPathFactory, source: Source) -> tuple[Source, SearchResult]:
     """A whole search that nothing interrupted, and what it found."""
     own = replace(source, out=tmp_path_factory.mktemp("searched"))
     return own, search(replace(TINY_SEARCH, conditioning=True), own, Workers())

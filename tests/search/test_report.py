@@ -14,17 +14,17 @@ from caldrive.cli import parse
 from caldrive.commands.train import Train
 from caldrive.search.examples import Source
 from caldrive.search.report import change, printed, result_values, write_report
-from caldrive.search.run import Findings
+from caldrive.search.run import SearchResult
 from tests.search.data import TINY_SEARCH
 
 
 @pytest.fixture(scope="module")
-def page(searched: tuple[Source, Findings]) -> Path:
+def page(searched: tuple[Source, SearchResult]) -> Path:
     source, findings = searched
     return write_report(findings, source, TINY_SEARCH)
 
 
-def test_the_page_has_our_figures_beside_the_papers(page: Path, searched: tuple[Source, Findings]) -> None:
+def test_the_page_has_our_figures_beside_the_papers(page: Path, searched: tuple[Source, SearchResult]) -> None:
     text, angle = page.read_text(), searched[1].tasks[1]
     best = angle.best.block
     row = f"| relative angle | {best.layer} | {best.nodes} | {best.dropout:.2f} | {best.length} | {best.dilation} "
@@ -41,7 +41,7 @@ def test_the_picture_has_a_row_for_each_task(page: Path) -> None:
         assert 300 < picture.height < 600
 
 
-def test_train_takes_the_best_blocks_from_a_file(page: Path, searched: tuple[Source, Findings]) -> None:
+def test_train_takes_the_best_blocks_from_a_file(page: Path, searched: tuple[Source, SearchResult]) -> None:
     train = parse(["train", "--config", str(page.with_name("blocks.toml"))])
     for task in searched[1].tasks:
         assert getattr(train.network, task.task) == task.best.block
@@ -49,7 +49,7 @@ def test_train_takes_the_best_blocks_from_a_file(page: Path, searched: tuple[Sou
     assert set(tomllib.loads(page.with_name("blocks.toml").read_text())["network"]) == set(TINY_SEARCH.tasks)
 
 
-def test_a_task_without_one_kind_of_block_has_a_dash(page: Path, searched: tuple[Source, Findings]) -> None:
+def test_a_task_without_one_kind_of_block_has_a_dash(page: Path, searched: tuple[Source, SearchResult]) -> None:
     source, findings = searched
     angle = findings.tasks[1]
     temporal = tuple(block for block in angle.retrained if block.block.temporal)
@@ -67,7 +67,7 @@ def test_values_are_printed_as_the_supplement_prints_them() -> None:
     assert change(0.0, 1.0) == "-"
 
 
-def test_the_answer_is_json(searched: tuple[Source, Findings], page: Path) -> None:
+def test_the_answer_is_json(searched: tuple[Source, SearchResult], page: Path) -> None:
     values = json.loads(json.dumps(result_values(searched[1], page), allow_nan=False))
     assert values["tasks"]["hazard_stop"]["trials"] == TINY_SEARCH.trials
     assert Path(values["networks"]["groups"]["model"]).is_file()

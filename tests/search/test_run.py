@@ -19,12 +19,12 @@ from caldrive.perception.network.checkpoint import load_network
 from caldrive.search import joint, run, studies
 from caldrive.search.config import SearchConfig
 from caldrive.search.examples import Source
-from caldrive.search.run import Findings, Workers, search
+from caldrive.search.run import SearchResult, Workers, search
 from tests.parallel import fake_ray
 from tests.perception.data import column_image, see
 from tests.search.data import TINY_SEARCH
 
-Searched = tuple[Source, Findings]
+Searched = tuple[Source, SearchResult]
 
 
 def test_the_network_of_the_best_blocks_drives(searched: Searched) -> None:

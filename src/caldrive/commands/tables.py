@@ -24,8 +24,8 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.driving.speed import WorldTiming
     from caldrive.perception.evaluation.report import Report
     from caldrive.recordings.check import RecordingSummary
-    from caldrive.search.run import Findings
-    from caldrive.tune.auto import Findings as Tuning
+    from caldrive.search.run import SearchResult
+    from caldrive.tune.auto import TuningResult
     from caldrive.tune.config import TuneConfig
 
 
@@ -190,7 +190,7 @@ def _confusion(name: str, report: Report) -> Table:
     return table
 
 
-def search_table(findings: Findings, page: Path) -> Group:
+def search_table(findings: SearchResult, page: Path) -> Group:
     """The best block of each task with its score, and where everything is."""
     from caldrive.search.report import change, printed
 
@@ -209,7 +209,7 @@ def search_table(findings: Findings, page: Path) -> Group:
     return Group(table, Text(f"report: {page}"), drive)
 
 
-def tuning_table(findings: Tuning, config: TuneConfig, page: Path, controller: Path) -> Group:
+def tuning_table(findings: TuningResult, config: TuneConfig, page: Path, controller: Path) -> Group:
     """Costs before and after, the constants that changed, and where everything is."""
     from caldrive.tune.report import HEADS, constant_rows, cost_rows
 

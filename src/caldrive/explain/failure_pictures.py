@@ -22,7 +22,7 @@ from caldrive.agents.rows import model_path
 from caldrive.agents.settings import AgentSettings
 from caldrive.benchmark.artifacts import JPEG, read_still, read_trace
 from caldrive.benchmark.report.failure_cards import by_importance
-from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Moment, failures
+from caldrive.benchmark.report.runs import BenchmarkRun, Failure, FailureMoment, failures
 from caldrive.benchmark.run_folder import RunFolder
 from caldrive.datatypes import CameraConfig, Command, Image, Step
 from caldrive.driving.rollout import rollout
@@ -190,14 +190,14 @@ def with_pictures(run: BenchmarkRun) -> BenchmarkRun:
     return replace(run, explanations=explanations)
 
 
-def _moments(path: Path, drawn: Drawn) -> Iterator[Moment]:
+def _moments(path: Path, drawn: Drawn) -> Iterator[FailureMoment]:
     """The moments of a failure, from the pictures that are beside its file."""
     for k, glance in enumerate(drawn.plan.glances):
         text = f"{glance.text}; the network says {drawn.replies[k]}" if drawn.replies else glance.text
         still, attention = (_picture_path(path, k, kind) for kind in ("still", "attention"))
         if still.is_file():
             seen = read_still(attention) if attention.is_file() else None
-            yield Moment(glance.title, text, read_still(still), seen)
+            yield FailureMoment(glance.title, text, read_still(still), seen)
 
 
 def _read(run: BenchmarkRun, key: str) -> Drawn | None:

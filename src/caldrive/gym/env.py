@@ -14,7 +14,7 @@ from caldrive.driving.rules import RULES
 from caldrive.driving.setup import make_world
 from caldrive.driving.tasks import task_scenarios
 from caldrive.gym.config import EnvConfig, configured
-from caldrive.gym.rewards import PRESETS, Moment
+from caldrive.gym.rewards import PRESETS, Transition
 from caldrive.gym.spaces import action_space, observation_space, observed
 from caldrive.interfaces import World
 from caldrive.results import InfractionKind, Outcome
@@ -129,8 +129,8 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
         broke = drive.referee.watch(drive.truth) is Outcome.FAILED
         aside = abs(drive.truth.affordances.center_distance)
         drive.left_route = self.config.leaves_route and aside >= MAX_CENTER_DISTANCE
-        moment = Moment(before, drive.truth, drive.last, control, broke or drive.left_route)
-        for name, value in PRESETS[self.config.reward].rewards(moment, self.config.weights).items():
+        transition = Transition(before, drive.truth, drive.last, control, broke or drive.left_route)
+        for name, value in PRESETS[self.config.reward].rewards(transition, self.config.weights).items():
             total[name] = total.get(name, 0.0) + value
         drive.last = control
         return observation

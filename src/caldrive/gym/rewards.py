@@ -22,7 +22,7 @@ STEADY = 0.01  # of the steering, below which a change is none
 
 
 @dataclass(frozen=True)
-class Moment:
+class Transition:
     """What a reward is made of: what was true before and is now, and how it was driven before and since."""
 
     before: Truth
@@ -33,7 +33,7 @@ class Moment:
     """Whether a rule was broken that ends the episode."""
 
 
-Terms = Callable[[Moment], dict[str, float]]
+Terms = Callable[[Transition], dict[str, float]]
 
 
 @dataclass(frozen=True)
@@ -45,16 +45,16 @@ class Preset:
     weights: Mapping[str, float]
     """By the names of the terms."""
 
-    def rewards(self, moment: Moment, changed: Mapping[str, float]) -> dict[str, float]:
+    def rewards(self, transition: Transition, changed: Mapping[str, float]) -> dict[str, float]:
         """The terms with their weights; their sum is the reward. changed: weights in place of the preset's."""
         weights = {**self.weights, **changed}
-        return {name: weights[name] * value for name, value in self.terms(moment).items()}
+        return {name: weights[name] * value for name, value in self.terms(transition).items()}
 
 
-def carla2017_terms(moment: Moment) -> dict[str, float]:
+def carla2017_terms(transition: Transition) -> dict[str, float]:
     """S.2.3: kilometres towards the goal along the route, km/h gained, damage (impulses in N s), and how much more of
     the car is on the sidewalk and on the opposite lane."""
-    before, now = moment.before, moment.now
+    before, now = transition.before, transition.now
     return {
         "distance": (now.route_done - before.route_done) / 1000,
         "speed": (now.ego.speed - before.ego.speed) / KMH,
@@ -64,16 +64,16 @@ def carla2017_terms(moment: Moment) -> dict[str, float]:
     }
 
 
-def roach_terms(moment: Moment) -> dict[str, float]:
+def roach_terms(transition: Transition) -> dict[str, float]:
     """Speed near the wanted one, distance to the centre line (m) and angle to the route (rad), changes of the steering,
     and the end by a broken rule."""
-    now, seen = moment.now, moment.now.affordances
+    now, seen = transition.now, transition.now.affordances
     return {
         "speed": 1 - abs(now.ego.speed - wanted_speed(now)) / MOST_WANTED,
         "position": -abs(seen.center_distance) / 2,
         "angle": -abs(seen.relative_angle),
-        "steering": -float(abs(moment.control.steer - moment.last.steer) > STEADY),
-        "end": -(1 + now.ego.speed) if moment.broke else 0.0,
+        "steering": -float(abs(transition.control.steer - transition.last.steer) > STEADY),
+        "end": -(1 + now.ego.speed) if transition.broke else 0.0,
     }
 
 

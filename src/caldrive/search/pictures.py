@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from caldrive.affordances import BY_NAME
-from caldrive.search.run import TaskFindings
+from caldrive.search.run import TaskResult
 from caldrive.search.space import DILATION, DROPOUT, LAYERS, LENGTH, NODES
 from caldrive.search.studies import FinishedTrial
 
@@ -19,7 +19,7 @@ MARGIN = 0.04  # of an axis, beyond its ends
 WHOLE, PRUNED = "#3b6ea5", "none"
 
 
-def draw_parameters(tasks: Sequence[TaskFindings], shares: Mapping[str, Mapping[str, float]]) -> Figure:
+def draw_parameters(tasks: Sequence[TaskResult], shares: Mapping[str, Mapping[str, float]]) -> Figure:
     """A row a task, a column a parameter. shares: the parameters' importance by task, where it is known."""
     from matplotlib.figure import Figure
 

@@ -16,14 +16,14 @@ from caldrive.search.best import Retrained
 from caldrive.search.config import SearchConfig
 from caldrive.search.examples import HISTORY, Source
 from caldrive.search.pictures import draw_parameters
-from caldrive.search.run import Findings, TaskFindings
+from caldrive.search.run import SearchResult, TaskResult
 from caldrive.search.space import PUBLISHED, PUBLISHED_TEMPORAL
 from caldrive.search.studies import importances
 
 PAGE, PICTURE, BLOCKS = "report.md", "parameters.png", "blocks.toml"
 
 
-def write_report(findings: Findings, source: Source, config: SearchConfig) -> Path:
+def write_report(findings: SearchResult, source: Source, config: SearchConfig) -> Path:
     """Writes report.md, parameters.png and blocks.toml into the search's folder; returns the page's path."""
     shares = {task.task: importances(source, config, task.task) for task in findings.tasks}
     write_figure(source.out / PICTURE, draw_parameters(findings.tasks, shares))
@@ -43,7 +43,7 @@ def change(before: float, after: float) -> str:
     return f"{100 * (after - before) / before:+.1f} %" if before else "-"
 
 
-def _sections(findings: Findings, config: SearchConfig) -> Iterable[str]:
+def _sections(findings: SearchResult, config: SearchConfig) -> Iterable[str]:
     yield "# Search for task blocks"
     yield _about(findings, config)
     yield "## The best blocks, beside the supplement's"
@@ -73,7 +73,7 @@ def _sections(findings: Findings, config: SearchConfig) -> Iterable[str]:
     yield f"![Each task's score over each parameter]({PICTURE})"
 
 
-def _about(findings: Findings, config: SearchConfig) -> str:
+def _about(findings: SearchResult, config: SearchConfig) -> str:
     trials = [trial for task in findings.tasks for trial in task.trials]
     pruned, seconds = sum(trial.pruned for trial in trials), [trial.seconds for trial in trials]
     return (
@@ -90,7 +90,7 @@ def _parameters(block: BlockConfig) -> list[str]:
     return [block.layer, str(block.nodes), f"{block.dropout:.2f}", str(block.length), str(block.dilation)]
 
 
-def _best_blocks(findings: Findings) -> str:
+def _best_blocks(findings: SearchResult) -> str:
     names = ("type", "nodes", "p", "seq", "dil")
     head = ["task", *names, *(f"{name}, paper" for name in names)]
     rows = (
@@ -100,7 +100,7 @@ def _best_blocks(findings: Findings) -> str:
     return markdown_table(head, rows)
 
 
-def _trained_again(findings: Findings) -> str:
+def _trained_again(findings: SearchResult) -> str:
     head = ("task", "trial", "type", "nodes", "p", "seq", "dil", "in the search", "again")
     rows = (
         [
@@ -116,16 +116,16 @@ def _trained_again(findings: Findings) -> str:
     return markdown_table(head, rows)
 
 
-def _searched(task: TaskFindings, block: Retrained) -> str:
+def _searched(task: TaskResult, block: Retrained) -> str:
     trial = next(trial for trial in task.trials if trial.draw == block.draw)
     return printed(task.task, trial.value) + (" (pruned)" if trial.pruned else "")
 
 
-def _again(task: TaskFindings, block: Retrained) -> str:
+def _again(task: TaskResult, block: Retrained) -> str:
     return f"{printed(task.task, block.mean)} ± {printed(task.task, block.spread)}"
 
 
-def _temporal(findings: Findings) -> str:
+def _temporal(findings: SearchResult) -> str:
     head = (
         "task", "metric", "without", "with history", "change", "without, paper", "with, paper", "change, paper",
     )  # fmt: skip
@@ -140,19 +140,19 @@ def _temporal(findings: Findings) -> str:
     return markdown_table(head, rows)
 
 
-def _joint(findings: Findings) -> str:
+def _joint(findings: SearchResult) -> str:
     joint = findings.networks["groups"].scores
     rows = ([BY_NAME[name].title, printed(name, findings.before[name]), printed(name, joint[name])] for name in joint)
     return markdown_table(("task", "the network before", "the best blocks"), rows)
 
 
-def _conditioning(tasks: Sequence[TaskFindings]) -> str:
+def _conditioning(tasks: Sequence[TaskResult]) -> str:
     kinds = [block.block.conditioning for block in tasks[0].conditioned]
     rows = ([BY_NAME[task.task].title, *(_again(task, block) for block in task.conditioned)] for task in tasks)
     return markdown_table(("task", *kinds), rows)
 
 
-def result_values(findings: Findings, page: Path) -> dict[str, Any]:
+def result_values(findings: SearchResult, page: Path) -> dict[str, Any]:
     """For --json."""
     tasks = {
         task.task: {
@@ -170,6 +170,6 @@ def result_values(findings: Findings, page: Path) -> dict[str, Any]:
     return {"report": str(page), "tasks": tasks, "before": findings.before, "networks": networks}
 
 
-def blocks_toml(findings: Findings) -> str:
+def blocks_toml(findings: SearchResult) -> str:
     """The best blocks as settings, for `caldrive train --config`."""
     return toml({"network": {task.task: asdict(task.best.block) for task in findings.tasks}})

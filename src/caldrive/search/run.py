@@ -53,7 +53,7 @@ class Workers:
 
 
 @dataclass(frozen=True)
-class TaskFindings:
+class TaskResult:
     """What a search found for a task."""
 
     task: str
@@ -76,10 +76,10 @@ class TaskFindings:
 
 
 @dataclass(frozen=True)
-class Findings:
+class SearchResult:
     """What a search found."""
 
-    tasks: tuple[TaskFindings, ...]
+    tasks: tuple[TaskResult, ...]
     before: Mapping[str, float]
     """The scores by task of the network that the backbone comes from."""
     networks: Mapping[Conditioning, JointNetwork]
@@ -90,7 +90,7 @@ class Findings:
     """That train and that are held out."""
 
 
-def search(config: SearchConfig, source: Source, workers: Workers, progress: Progress = silent) -> Findings:
+def search(config: SearchConfig, source: Source, workers: Workers, progress: Progress = silent) -> SearchResult:
     """Does what a search's folder lacks: trials, the best of each task again, and the network of the best.
 
     In the folder lie journal.log (Optuna's), features, retrained, and model.safetensors. Raises ValueError where the
@@ -121,7 +121,7 @@ def _run_trials(config: SearchConfig, source: Source, workers: Workers, progress
         progress(f"trial {done} of {total}, {BY_NAME[job.task].title}", done / total)
 
 
-def _findings(config: SearchConfig, source: Source, workers: Workers, progress: Progress) -> Findings:
+def _findings(config: SearchConfig, source: Source, workers: Workers, progress: Progress) -> SearchResult:
     """Trains the best again, then their network."""
     tasks: tuple[str, ...] = config.tasks
     trials = {task: finished_trials(source, config, task) for task in tasks}
@@ -136,9 +136,9 @@ def _findings(config: SearchConfig, source: Source, workers: Workers, progress: 
         for kind, blocks in _networks(best, conditional)
     }
     training, validation = worker_examples(source)
-    return Findings(
+    return SearchResult(
         tasks=tuple(
-            TaskFindings(task, tuple(trials[task]), tuple(again[task]), tuple(conditioned.get(task, ())))
+            TaskResult(task, tuple(trials[task]), tuple(again[task]), tuple(conditioned.get(task, ())))
             for task in tasks
         ),
         before=network_scores(load_network(source.model)[0], validation),

@@ -43,7 +43,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Findings:
+class TuningResult:
     """What a search found: the controller before it and the best one, and how many trials there were."""
 
     before: Judged
@@ -54,7 +54,7 @@ class Findings:
 
 def tune(
     config: TuneConfig, controller: ControlConfig, out: Path, workers: int = 1, progress: Progress = silent
-) -> Findings:
+) -> TuningResult:
     """Does the trials that the folder lacks, and judges the best.
 
     In the folder lie journal.log (Optuna's) and tune.json. Raises ValueError where what lies there belongs to another
@@ -161,7 +161,9 @@ def best_controller(out: Path, config: TuneConfig, controller: ControlConfig) ->
     return with_values(controller, _values(best.params, _searched(config, controller)))
 
 
-def _findings(out: Path, config: TuneConfig, controller: ControlConfig, workers: int, progress: Progress) -> Findings:
+def _findings(
+    out: Path, config: TuneConfig, controller: ControlConfig, workers: int, progress: Progress
+) -> TuningResult:
     """Judges the best beside the controller before; what is no better than that is not taken."""
     judges = [controller, best_controller(out, config, controller)]
     before, after = _judged(config, judges, workers, progress)
@@ -169,7 +171,7 @@ def _findings(out: Path, config: TuneConfig, controller: ControlConfig, workers:
         after = before
     trials = finished(open_study(out, config), NUMBER)
     pruned = sum(trial.state == require_optuna().trial.TrialState.PRUNED for trial in trials)
-    return Findings(before, after, len(trials), pruned)
+    return TuningResult(before, after, len(trials), pruned)
 
 
 def _judged(config: TuneConfig, controllers: Sequence[ControlConfig], workers: int, progress: Progress) -> list[Judged]:
@@ -196,7 +198,7 @@ def _judge(config: TuneConfig, controllers: Sequence[ControlConfig], job: tuple[
     return cost(drive(maneuvers[place], controllers[which]))
 
 
-def changed_constants(findings: Findings) -> dict[str, tuple[Any, Any]]:
+def changed_constants(findings: TuningResult) -> dict[str, tuple[Any, Any]]:
     """The constants that differ, before and after."""
     before, after = values_of(findings.before.controller), values_of(findings.after.controller)
     return {name: (before[name], after[name]) for name in before if before[name] != after[name]}

@@ -9,7 +9,7 @@ from typing import Any
 
 from caldrive.files import write_whole
 from caldrive.formats import markdown_table
-from caldrive.tune.auto import Findings, Judged, changed_constants
+from caldrive.tune.auto import Judged, TuningResult, changed_constants
 from caldrive.tune.config import TuneConfig
 from caldrive.tune.constants import write_controller
 from caldrive.tune.cost import Cost
@@ -18,7 +18,7 @@ PAGE = "report.md"
 HEADS = ("where", "controller", "cost", "time", "jerk", "centre", "infractions")
 
 
-def write_report(findings: Findings, config: TuneConfig, out: Path, controller: Path) -> Path:
+def write_report(findings: TuningResult, config: TuneConfig, out: Path, controller: Path) -> Path:
     """Writes report.md into the search's folder, and the controller's file; returns the page's path."""
     write_controller(controller, findings.after.controller)
     page = out / PAGE
@@ -26,7 +26,7 @@ def write_report(findings: Findings, config: TuneConfig, out: Path, controller: 
     return page
 
 
-def cost_rows(findings: Findings, config: TuneConfig) -> list[tuple[str, ...]]:
+def cost_rows(findings: TuningResult, config: TuneConfig) -> list[tuple[str, ...]]:
     """Rows below HEADS: where it was tuned, and on other routes, before and after."""
     judged = {"before": findings.before, "after": findings.after}
     rows = [("where it was tuned", name, *_figures(one.tuned, config)) for name, one in judged.items()]
@@ -35,12 +35,12 @@ def cost_rows(findings: Findings, config: TuneConfig) -> list[tuple[str, ...]]:
     ]
 
 
-def constant_rows(findings: Findings) -> list[tuple[str, str, str]]:
+def constant_rows(findings: TuningResult) -> list[tuple[str, str, str]]:
     """The constants that changed: name, before and after."""
     return [(name, f"{old:.4g}", f"{new:.4g}") for name, (old, new) in changed_constants(findings).items()]
 
 
-def report_values(findings: Findings, config: TuneConfig, controller: Path) -> dict[str, Any]:
+def report_values(findings: TuningResult, config: TuneConfig, controller: Path) -> dict[str, Any]:
     """The findings in JSON's types."""
 
     def values(judged: Judged) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def _figures(cost: Cost, config: TuneConfig) -> tuple[str, ...]:
     return tuple(f"{part:.3f}" for part in parts)
 
 
-def _sections(findings: Findings, config: TuneConfig) -> Iterable[str]:
+def _sections(findings: TuningResult, config: TuneConfig) -> Iterable[str]:
     weights = ", ".join(f"{name} {weight:g}" for name, weight in vars(config.cost).items())
     driven = [*config.maneuvers, *(f"route {k} of town01" for k in range(config.routes))]
     yield "# Search for the controller's constants"

@@ -28,7 +28,7 @@ from caldrive.benchmark.report.runs import (
     LARGE_ERRORS,
     BenchmarkRun,
     Explanation,
-    Moment,
+    FailureMoment,
     failures,
     load_run,
     load_runs,
@@ -102,7 +102,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
     path.parent.mkdir()
     path.write_bytes(gzip.compress(json.dumps(content).encode()))
     jpeg = still.read_bytes()
-    moments = tuple(Moment(title, "red light: seen 3 %, true yes", jpeg, jpeg) for title in ("1 s before", "red light"))
+    moments = tuple(
+        FailureMoment(title, "red light: seen 3 %, true yes", jpeg, jpeg) for title in ("1 s before", "red light")
+    )
     why = Explanation("red light: its truth rescues it", ("red light",), ("red light",), moments)
     return [both[0], replace(both[1], explanations={both[1].results[9].trial.key: why})]
 
@@ -260,7 +262,7 @@ def test_blame_is_counted_and_stands_beside_each_failure(runs: list[BenchmarkRun
 
 @pytest.mark.parametrize("size", [10_300, 30_000])
 def test_thirty_failures_with_pictures_stay_below_three_megabytes(size: int, tmp_path: Path) -> None:
-    why = Explanation(moments=(Moment("1 s before", "", b"x" * size, b"x" * size),) * 3)
+    why = Explanation(moments=(FailureMoment("1 s before", "", b"x" * size, b"x" * size),) * 3)
     sound = run("cal", tmp_path)
     bad = [replace(one, episode=replace(one.episode, outcome=Outcome.TIMEOUT)) for one in sound.results[:30]]
     explained = replace(sound, results=tuple(bad), explanations={one.trial.key: why for one in bad})

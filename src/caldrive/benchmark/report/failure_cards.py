@@ -9,7 +9,7 @@ from pathlib import Path
 
 from caldrive.benchmark.artifacts import read_still, still_paths
 from caldrive.benchmark.metrics import succeeded
-from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Moment, failures
+from caldrive.benchmark.report.runs import BenchmarkRun, Failure, FailureMoment, failures
 
 PICTURE_BYTES = 1_900_000  # of all pictures; on the page they take a third more, and it is to stay below 3 MB
 ATTENTION = (
@@ -54,13 +54,13 @@ def _chosen_pictures(failed: Sequence[Failure], folders: Mapping[str, Path]) -> 
 def _pictures(failure: Failure, folder: Path) -> tuple[str, int]:
     """A failure's moments, or else the stills of its benchmark, and how many bytes the pictures have."""
     moments = failure.explanation.moments or [
-        Moment("", "", read_still(path)) for path in still_paths(folder, failure.result.trial.key)
+        FailureMoment("", "", read_still(path)) for path in still_paths(folder, failure.result.trial.key)
     ]
     size = sum(len(moment.still) + len(moment.attention or b"") for moment in moments)
     return f'<div class="moments">{"".join(map(_moment, moments))}</div>', size
 
 
-def _moment(moment: Moment) -> str:
+def _moment(moment: FailureMoment) -> str:
     images = _image(moment.still, "still") + (_image(moment.attention, "attention") if moment.attention else "")
     caption = f"<b>{escape(moment.title)}</b> {escape(moment.text)}" if moment.title else ""
     return f"<figure>{images}<figcaption>{caption}</figcaption></figure>"

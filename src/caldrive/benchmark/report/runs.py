@@ -29,7 +29,7 @@ OPTIONS = {"--controller": "controller", "--time-limit": "time_limit", "--seed":
 
 
 @dataclass(frozen=True)
-class Moment:
+class FailureMoment:
     """What the car saw at a moment of a failure."""
 
     title: str
@@ -52,7 +52,7 @@ class Explanation:
     """The same as names: each of them alone is to blame."""
     alone: tuple[str, ...] = ()
     """The affordances that spoil the episode when they alone are seen."""
-    moments: tuple[Moment, ...] = ()
+    moments: tuple[FailureMoment, ...] = ()
     """How it came to it, the last one where it happens."""
     note: str = ""
     """What there is to say about these moments."""
