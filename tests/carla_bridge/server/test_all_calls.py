@@ -109,7 +109,7 @@ def test_a_call_is_refused_in_a_sentence(client: WireClient, numbers: dict[str, 
         client.call(method, *arguments)
 
 
-@pytest.mark.parametrize("kind", ["sensor.lidar.ray_cast_semantic", "sensor.other.rss", "sensor.camera.optical_flow"])
+@pytest.mark.parametrize("kind", ["sensor.camera.dvs", "sensor.other.rss", "sensor.camera.optical_flow"])
 def test_a_sensor_that_is_not_simulated_is_refused_when_it_is_spawned(client: WireClient, kind: str) -> None:
     with pytest.raises(RefusedError, match=r"docs/carla\.md"):
         client.spawn(kind, (0.0, 0.0, 0.0))

@@ -12,7 +12,7 @@ from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, REFUSED, SIZES
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.episode import PERSON_BOX
 from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox, Transform, Vector, placement
-from caldrive.carla_bridge.server.sensors import SensorActor, checked
+from caldrive.carla_bridge.server.sensor_actors import SensorActor, checked
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.vehicles import Vehicle, config_of
 from caldrive.carla_bridge.server.walkers import RADIUS, UP, Walker

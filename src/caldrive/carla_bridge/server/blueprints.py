@@ -77,9 +77,9 @@ PROPS = (
     ("static.prop.constructioncone", 0.4, 0.4, 0.6), ("static.prop.dirtdebris01", 2.4, 1.5, 0.1),
     ("static.prop.warningconstruction", 0.4, 1.2, 1.1), ("static.prop.trafficwarning", 2.8, 2.4, 3.5),
 )  # fmt: skip
-CAMERAS = ("rgb", "depth", "semantic_segmentation")
-NOT_DRAWN = ("instance_segmentation", "dvs", "optical_flow", "normals")
-REFUSED = (*(f"sensor.camera.{kind}" for kind in NOT_DRAWN), "sensor.lidar.ray_cast_semantic", "sensor.other.rss")
+CAMERAS = ("rgb", "depth", "semantic_segmentation", "instance_segmentation")
+NOT_DRAWN = ("dvs", "optical_flow", "normals")
+REFUSED = (*(f"sensor.camera.{kind}" for kind in NOT_DRAWN), "sensor.other.rss")
 _LENS = {
     "lens_circle_falloff": "5.0", "lens_circle_multiplier": "0.0", "lens_k": "-1.0", "lens_kcube": "0.0",
     "lens_x_size": "0.08", "lens_y_size": "0.08",

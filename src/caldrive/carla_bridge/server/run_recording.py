@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from caldrive.carla_bridge.server.actors import NOBODY, Actor
 from caldrive.carla_bridge.server.episode import Episode
-from caldrive.carla_bridge.server.sensors import Message, SensorActor
+from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.carla_bridge.server.walkers import Walker
 from caldrive.datatypes import LightState

@@ -1,35 +1,31 @@
-"""The sensors that clients spawn, and what each of them says after a step."""
+"""What the sensors that clients spawn say after a step: those with pictures and rays here, others in `instruments`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from caldrive.carla_bridge.axes import Placement, to_carla
-from caldrive.carla_bridge.server import wire
-from caldrive.carla_bridge.server.actors import Actor, Label, Prop, description
-from caldrive.carla_bridge.server.contacts import prop_box, way_ahead
+from caldrive.carla_bridge.axes import Placement
+from caldrive.carla_bridge.server.actors import Label
 from caldrive.carla_bridge.server.episode import Episode
-from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox
-from caldrive.carla_bridge.server.ranging import Rays, detections, lidar_settings, radar_settings, scan
+from caldrive.carla_bridge.server.instances import Body, Pictures, instances, semantic_scan, with_cosines
+from caldrive.carla_bridge.server.instruments import collisions, gnss, imu, obstacle
+from caldrive.carla_bridge.server.lidar import Rays, lidar_settings, scan
+from caldrive.carla_bridge.server.radar import detections, radar_settings
+from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.snapshot import Sensor, header
-from caldrive.carla_bridge.server.wire import Refusal
-from caldrive.checks import MOST_PIXELS
 from caldrive.datatypes import Semantic
-from caldrive.world.rendering.camera import CameraRig
+from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.rendering.pinhole import PinholeCamera
 from caldrive.world.town import Town
-from caldrive.world.traffic.collisions import obstacle_of
 
-EARTH = 0.9996 * 6_378_137.0  # m, the radius by which CARLA's client turns places into degrees (it scales by UTM's)
-GRAVITY = 9.81  # m/s²
 FARTHEST = 1000.0  # m that a depth image reaches
 DEPTH_STEPS = 256**3 - 1
-MOST_AREA = 2**22  # pixels of an image
+SEMANTIC_POINT = np.dtype([("place", "<f4", 3), ("cosine", "<f4"), ("id", "<u4"), ("label", "<u4")])
 LABELS = {
     Semantic.SKY: Label.SKY, Semantic.ROAD: Label.ROAD, Semantic.LINE: Label.LINE, Semantic.SIDEWALK: Label.SIDEWALK,
     Semantic.GROUND: Label.TERRAIN, Semantic.BUILDING: Label.BUILDING, Semantic.PLANT: Label.VEGETATION,
@@ -37,43 +33,6 @@ LABELS = {
     Semantic.VEHICLE: Label.CAR, Semantic.PERSON: Label.PEDESTRIAN,
 }  # fmt: skip
 _LABELS = np.array([LABELS[Semantic(k)] for k in range(len(Semantic))], np.uint8)
-Message = list[Any]  # pieces of bytes
-
-
-@dataclass(eq=False)
-class SensorActor(Actor):
-    """A sensor."""
-
-    every: float = 0.0
-    """s between two messages; 0 for one in each step."""
-    due: float = 0.0
-    """s of the next."""
-    size: tuple[int, int] = (0, 0)
-    """Of an image, pixels."""
-    fov: float = 90.0
-    """Degrees."""
-    angle: float = 0.0
-    """Of a lidar's turn, rad."""
-    is_silent: bool = False
-    """Whether a fault has ended what it says."""
-
-
-def checked(sensor: SensorActor) -> SensorActor:
-    """A sensor with its attributes read. Raises Refusal where they cannot be."""
-    asked = sensor.description
-    sensor.every = asked.number("sensor_tick", 0.0, 0.0, 1e6)
-    if ".camera." in sensor.kind:
-        width, height = (int(asked.number(f"image_size_{axis}", 800, 1, MOST_PIXELS)) for axis in "xy")
-        if width * height > MOST_AREA:
-            raise Refusal(f"found an image of {width} x {height}, wanted {MOST_AREA} pixels at most: ask for fewer")
-        sensor.size, sensor.fov = (width, height), asked.number("fov", 90.0, 1.0, 170.0)
-    if sensor.kind == "sensor.lidar.ray_cast":
-        lidar_settings(asked)
-    if sensor.kind == "sensor.other.radar":
-        radar_settings(asked)
-    if sensor.kind == "sensor.other.obstacle":
-        _reach(asked)
-    return sensor
 
 
 class Senses:
@@ -84,9 +43,11 @@ class Senses:
         self._rig: CameraRig | None = None
         self._say: dict[str, Callable[[SensorActor, Episode], Iterator[tuple[Sensor, Message]]]] = {
             "sensor.camera.rgb": self._rgb, "sensor.camera.depth": self._depth,
-            "sensor.camera.semantic_segmentation": self._semantic, "sensor.other.gnss": _gnss,
-            "sensor.other.imu": _imu, "sensor.other.collision": _collisions, "sensor.other.obstacle": _obstacle,
-            "sensor.lidar.ray_cast": self._lidar, "sensor.other.radar": self._radar,
+            "sensor.camera.semantic_segmentation": self._semantic, "sensor.other.gnss": gnss,
+            "sensor.camera.instance_segmentation": self._instances, "sensor.other.imu": imu,
+            "sensor.other.collision": collisions, "sensor.other.obstacle": obstacle,
+            "sensor.lidar.ray_cast": self._lidar, "sensor.lidar.ray_cast_semantic": self._semantic_lidar,
+            "sensor.other.radar": self._radar,
         }  # fmt: skip
 
     def messages(self, sensor: SensorActor, episode: Episode, frame: int) -> Iterator[Message]:
@@ -131,13 +92,32 @@ class Senses:
         steps = (shares * DEPTH_STEPS).astype(np.uint32)
         yield Sensor.DEPTH, _image(sensor, np.stack((steps >> 16, steps >> 8 & 255, steps & 255), axis=-1))
 
+    def _instances(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
+        scene, camera = episode.scene(sensor.place, sensor.parent), camera_of(sensor)
+        distances, classes = self._pictures(scene)(camera)
+        bodies: list[Body] = [*scene.vehicles, *scene.pedestrians]
+        ids = _ids(bodies, episode)[instances(camera, distances, classes, bodies)]
+        picture = _in_red(_LABELS[classes])
+        picture[..., 1], picture[..., 0] = ids & 255, ids >> 8 & 255
+        yield Sensor.INSTANCE, _image(sensor, picture)
+
     def _lidar(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
         lidar, rays = lidar_settings(sensor.description), self._rays(sensor, episode)
         found = scan(lidar, sensor.place, sensor.angle, rays)
-        sensor.angle = math.fmod(sensor.angle + lidar.turned(rays.delta), lidar.width)
-        head = np.array([len(found.counts), *found.counts], "<u4").tobytes()
+        head = _turn_on(sensor, lidar.turned(rays.delta), lidar.width, found.counts)
         points = (found.points * (1.0, -1.0, 1.0, 1.0)).astype("<f4")  # x, y to the right, z, intensity
-        yield Sensor.LIDAR, [np.array([sensor.angle], "<f4").tobytes() + head, points.tobytes()]
+        yield Sensor.LIDAR, [head, points.tobytes()]
+
+    def _semantic_lidar(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
+        lidar, scene = lidar_settings(sensor.description), episode.scene(sensor.place, sensor.parent)
+        bodies: list[Body] = [*scene.vehicles, *scene.pedestrians]
+        rays = self._rays(sensor, episode)._replace(views=with_cosines(self._pictures(scene)))
+        found = semantic_scan(lidar, sensor.place, sensor.angle, rays, bodies)
+        head = _turn_on(sensor, lidar.turned(rays.delta), lidar.width, found.counts)
+        points = np.zeros(len(found.points), SEMANTIC_POINT)
+        points["place"], points["cosine"] = found.points * (1.0, -1.0, 1.0), found.cosines
+        points["id"], points["label"] = _ids(bodies, episode)[found.bodies], _LABELS[found.classes]
+        yield Sensor.SEMANTIC_LIDAR, [head, points.tobytes()]
 
     def _radar(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
         vx, vy, _ = (sensor.parent or sensor).motion[0]
@@ -150,7 +130,23 @@ class Senses:
         """The same in each run of the same program."""
         scene = episode.scene(sensor.place, sensor.parent)
         rng = np.random.default_rng((sensor.id, round(1000 * episode.time)))
-        return Rays(max(sensor.every, episode.delta), lambda camera: self.rig.distances_from(camera, scene), rng)
+        views = lambda camera: self.rig.distances_from(camera, scene)[..., None]  # noqa: E731
+        return Rays(max(sensor.every, episode.delta), views, rng)
+
+    def _pictures(self, scene: SceneState) -> Pictures:
+        return lambda camera: (self.rig.distances_from(camera, scene), self.rig.semantics_from(camera, scene))
+
+
+def _turn_on(sensor: SensorActor, turned: float, width: float, counts: NDArray[Any]) -> bytes:
+    """Turns a lidar on, and gives the head of its message."""
+    sensor.angle = math.fmod(sensor.angle + turned, width)
+    return np.array([sensor.angle], "<f4").tobytes() + np.array([len(counts), *counts], "<u4").tobytes()
+
+
+def _ids(bodies: Sequence[Body], episode: Episode) -> NDArray[np.uint32]:
+    """The numbers of the actors that bodies belong to; the last one stands for none."""
+    actors = [episode.actor_of(body.id) for body in bodies]
+    return np.array([*(actor.id if actor else 0 for actor in actors), 0], np.uint32)
 
 
 def camera_of(sensor: SensorActor) -> PinholeCamera:
@@ -171,61 +167,3 @@ def _image(sensor: SensorActor, picture: Any) -> Message:
     out = np.full((height, width, 4), 255, np.uint8)
     out[..., :3] = picture
     return [np.array([width, height], "<u4").tobytes() + np.array([sensor.fov], "<f4").tobytes(), out]
-
-
-def geo_location(place: Placement) -> tuple[float, float, float]:
-    """Latitude, longitude (degrees) and height (m) of a place, as CARLA's client reckons them."""
-    x, y, z, *_ = to_carla(place)
-    return math.degrees(y / EARTH), math.degrees(x / EARTH), z
-
-
-def _gnss(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
-    yield Sensor.GNSS, [wire.encode(geo_location(sensor.place))]
-
-
-def _imu(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
-    place = sensor.place
-    _, turning, acceleration = sensor.parent.motion if sensor.parent else sensor.motion
-    _, _, _, _, yaw, _ = to_carla(place)
-    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
-    ahead, right = c * acceleration[0] + s * acceleration[1], c * acceleration[1] - s * acceleration[0]
-    gyro = tuple(math.radians(rate) for rate in turning)
-    compass = math.radians((yaw + 90.0) % 360.0)
-    yield Sensor.IMU, [wire.encode(((ahead, right, acceleration[2] + GRAVITY), gyro, compass))]
-
-
-def _collisions(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
-    for vehicle, contact in episode.hits:
-        if vehicle is not sensor.parent:
-            continue
-        heading = vehicle.state.pose.heading
-        impulse = (-contact.impulse * math.cos(heading), contact.impulse * math.sin(heading), 0.0)
-        yield Sensor.COLLISION, [wire.encode((vehicle.layout(b""), _other(contact.id, episode), impulse))]
-
-
-def _other(name: str, episode: Episode) -> Any:
-    """The actor behind a name, or one that stands for a thing of the town."""
-    actor = episode.actor_of(name)
-    if actor is not None:
-        return actor.layout(b"")
-    return 0, 0, description(f"static.{name.rstrip('0123456789')}"), BoundingBox(), bytes([Label.STATIC]), b""
-
-
-def _reach(asked: ActorDescription) -> tuple[float, float]:
-    """How far an obstacle sensor looks, and how far aside (m). Raises Refusal."""
-    return asked.number("distance", 5.0, 0.1, 500.0), asked.number("hit_radius", 0.5, 0.01, 50.0)
-
-
-def _obstacle(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
-    asked, place = sensor.description, sensor.place
-    reach, radius = _reach(asked)
-    own = sensor.parent.id if sensor.parent else 0
-    scene = episode.scene(place, None)
-    bodies: Sequence[Any] = (*scene.vehicles, *scene.pedestrians)
-    near = [obstacle_of(one) for one in bodies if (actor := episode.actor_of(one.id)) and actor.id != own]
-    if asked.get("only_dynamics", "false").lower() != "true":
-        near += [*episode.town.obstacles.near(place.pose, reach + radius), *map(prop_box, episode.all(Prop))]
-    found = way_ahead(place.pose, reach, radius, near)
-    if found is not None:
-        mine = (sensor.parent or sensor).layout(b"")
-        yield Sensor.OBSTACLE, [wire.encode((mine, _other(found[0].id, episode), found[1]))]

@@ -23,7 +23,8 @@ from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
-from caldrive.carla_bridge.server.sensors import Message, Senses, SensorActor
+from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
+from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
 from caldrive.carla_bridge.server.wire import Request, refused

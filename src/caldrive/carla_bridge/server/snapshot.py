@@ -28,9 +28,11 @@ class Sensor(IntEnum):
     IMU = 5
     OBSTACLE = 7
     RADAR = 9
+    SEMANTIC_LIDAR = 10
     LIDAR = 11
     RGB = 13
     SEMANTIC = 14
+    INSTANCE = 15
     WORLD = 17
 
 

@@ -37,6 +37,7 @@ def main() -> None:
         world.tick()
     assert abs(walker.get_location().distance(before) - 1.5) < 0.1
     measure_distances(world, car)
+    tell_actors_apart(world, car, points)
     refuse(world, car)
     imu.sensor.destroy()
     assert walker.destroy()
@@ -149,6 +150,29 @@ def measure_distances(world: carla.World, car: carla.Vehicle) -> None:
     assert all(one.depth < 100.0 and abs(one.azimuth) < 0.18 for one in found)
     for one in (lidar, radar):
         one.sensor.destroy()
+
+
+def tell_actors_apart(world: carla.World, car: carla.Vehicle, points: list[carla.Transform]) -> None:
+    """Another car, 12 m ahead, is seen by its number."""
+    car.set_transform(points[0])
+    other = spawned(world, "vehicle.audi.tt", points[1])
+    on_top = carla.Transform(carla.Location(z=2.4))
+    camera = Listener(spawned(world, "sensor.camera.instance_segmentation", on_top, car, image_size_x="200"))
+    lidar = Listener(spawned(world, "sensor.lidar.ray_cast_semantic", on_top, car, range="30"))
+    frame = world.tick()
+    image, cloud = camera.at(frame), lidar.at(frame)
+    picture = np.frombuffer(image.raw_data, np.uint8).reshape(image.height, image.width, 4)
+    blue, green, red = np.moveaxis(picture, 2, 0)[:3]
+    numbers = green.astype(int) + 256 * blue.astype(int)
+    assert (numbers == other.id).sum() > 50
+    assert set(red[numbers == other.id]) == {14}  # a car
+    points = [one for one in cloud if one.object_idx == other.id]
+    assert len(points) > 5
+    assert {one.object_tag for one in points} == {14}
+    assert all(8.0 < one.point.x < 15.0 and abs(one.point.y) < 1.5 for one in points)
+    assert all(0.0 <= one.cos_inc_angle <= 1.0 for one in cloud)
+    for one in (camera.sensor, lidar.sensor, other):
+        one.destroy()
 
 
 if __name__ == "__main__":

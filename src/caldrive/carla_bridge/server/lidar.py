@@ -1,4 +1,4 @@
-"""Lidar and radar, with the attributes and the laws of CARLA's (`sensor.lidar.ray_cast`, `sensor.other.radar`).
+"""Rays, and a lidar with the attributes and the laws of CARLA's (`sensor.lidar.ray_cast`).
 
 Rays are looked up in depth pictures of where they go: each ends where the pixel nearest to it shows something, so that
 all ends lie on the surfaces that cameras see, and its angle is off by half a pixel at most.
@@ -7,35 +7,32 @@ all ends lie on the surfaces that cameras see, and its angle is off by half a pi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.carla_bridge.axes import Placement, compose, rotation
+from caldrive.carla_bridge.axes import Placement, compose
 from caldrive.carla_bridge.server.layouts import ActorDescription
-from caldrive.datatypes import PedestrianState, VehicleState
 from caldrive.world.rendering.pinhole import PinholeCamera
 
 SECTOR = math.radians(60.0)  # that a depth picture covers from side to side
 PIXEL = math.radians(0.3)  # in its middle
 STEEPEST = 60.0  # degrees, up and down
 MOST_RAYS = 1_000_000  # a second
-NEAR = 0.2  # m around a body within which a point is on it
-LOW = 0.1  # m above the ground: what lies lower is the ground
-Body = VehicleState | PedestrianState
+NEAREST = 0.1  # m, for what is divided by a distance
 Array = NDArray[np.floating]
-Depths = Callable[[PinholeCamera], Array]
-"""Takes a picture (H, W) of distances along the optical axis, m."""
+Views = Callable[[PinholeCamera], Array]
+"""Takes pictures (H, W, K): of distances along the optical axis, m, and of what else there is to know."""
 
 
 class Rays(NamedTuple):
     """What rays are cast in: the time since the last ones (s), what is there, and chance."""
 
     delta: float
-    depths: Depths
+    views: Views
     rng: np.random.Generator
 
 
@@ -87,6 +84,14 @@ def lidar_settings(asked: ActorDescription) -> LidarSettings:
     )  # fmt: skip
 
 
+def directions(lidar: LidarSettings, angle: float, delta: float) -> tuple[Array, Array, int]:
+    """Of the rays of a lidar that turns on from an angle for delta seconds: to the left and up (N,), rad, channel by
+    channel, and how many of each channel."""
+    count = round(lidar.rate * delta / len(lidar.elevations))
+    turns = np.mod(angle + lidar.turned(delta) * np.arange(count) / max(count, 1), lidar.width)
+    return np.tile(lidar.width / 2 - turns, len(lidar.elevations)), np.repeat(lidar.elevations, count), count
+
+
 @dataclass(frozen=True)
 class LidarScan:
     """What a lidar says: for each channel how many points, and x, y, z (m, its own axes, ours) and intensity of all."""
@@ -98,77 +103,24 @@ class LidarScan:
 
 def scan(lidar: LidarSettings, place: Placement, angle: float, rays: Rays) -> LidarScan:
     """What a lidar finds while it turns on, to the right, from an angle (rad)."""
-    count, turned = round(lidar.rate * rays.delta / len(lidar.elevations)), lidar.turned(rays.delta)
-    turns = np.mod(angle + turned * np.arange(count) / max(count, 1), lidar.width)
-    azimuths, elevations = np.tile(lidar.width / 2 - turns, len(lidar.elevations)), np.repeat(lidar.elevations, count)
-    ends = cast(place, azimuths, elevations, rays.depths)
+    azimuths, elevations, count = directions(lidar, angle, rays.delta)
+    ends = cast(place, azimuths, elevations, rays.views)
     distances = np.linalg.norm(ends, axis=1)
     intensity = np.exp(-lidar.attenuation * distances)
     keep = (distances < lidar.range) & (rays.rng.random(len(ends)) >= lidar.lost)
     dark = lidar.lost_dark * (1.0 - intensity / lidar.bright)  # at or below 0 where it is bright
     keep &= rays.rng.random(len(ends)) >= dark
-    noise = rays.rng.normal(0.0, lidar.noise, len(ends)) / np.maximum(distances, LOW)
+    noise = rays.rng.normal(0.0, lidar.noise, len(ends)) / np.maximum(distances, NEAREST)
     points = np.column_stack((ends * (1.0 + noise[:, None]), intensity))[keep]
     return LidarScan(keep.reshape(len(lidar.elevations), count).sum(axis=1), points)
 
 
-@dataclass(frozen=True)
-class RadarSettings:
-    """What a radar can: its field of view (rad), its reach (m), points a second."""
-
-    width: float
-    height: float
-    range: float
-    rate: float
-
-
-def radar_settings(asked: ActorDescription) -> RadarSettings:
-    """From its blueprint. Raises Refusal for what cannot be."""
-    return RadarSettings(
-        width=math.radians(asked.number("horizontal_fov", 30.0, 1.0, 2 * STEEPEST)),
-        height=math.radians(asked.number("vertical_fov", 30.0, 1.0, 2 * STEEPEST)),
-        range=asked.number("range", 100.0, 0.1, 1000.0),
-        rate=asked.number("points_per_second", 1500, 1, MOST_RAYS),
-    )
-
-
-def detections(
-    radar: RadarSettings, place: Placement, velocity: tuple[float, float], bodies: Iterable[Body], rays: Rays
-) -> Array:
-    """What a radar finds, (N, 4): how fast it comes nearer (negative) or goes away (m/s), its angles to the left and up
-    (rad), and its distance (m). velocity: the radar's own, m/s in the world's axes; bodies: all that may move."""
-    count = round(radar.rate * rays.delta)
-    share, turn = rays.rng.random(count), rays.rng.random(count) * math.tau
-    azimuths, elevations = share * np.cos(turn) * radar.width / 2, share * np.sin(turn) * radar.height / 2
-    ends = cast(place, azimuths, elevations, rays.depths)
-    distances = np.linalg.norm(ends, axis=1)
-    ends, distances = ends[distances < radar.range], distances[distances < radar.range]
-    ways = (ends / distances[:, None]) @ rotation(place).T
-    points = ways * distances[:, None] + (place.x, place.y, place.z)
-    apart = ((velocities(points, bodies) - velocity) * ways[:, :2]).sum(axis=1)
-    left, up = np.arctan2(ends[:, 1], ends[:, 0]), np.arcsin(ends[:, 2] / distances)
-    return np.column_stack((apart, left, up, distances))
-
-
-def velocities(points: Array, bodies: Iterable[Body]) -> Array:
-    """How fast what lies at points (N, 3) moves, (N, 2) in m/s: as the body that it is on, or not at all."""
-    found = np.zeros((len(points), 2))
-    for body in bodies:
-        if body.speed == 0.0:
-            continue
-        c, s = math.cos(body.pose.heading), math.sin(body.pose.heading)
-        x, y = points[:, 0] - body.pose.x, points[:, 1] - body.pose.y
-        length, width = (body.length, body.width) if isinstance(body, VehicleState) else (2 * body.radius,) * 2
-        on_it = (np.abs(x * c + y * s) < length / 2 + NEAR) & (np.abs(y * c - x * s) < width / 2 + NEAR)
-        found[on_it & (points[:, 2] > LOW)] = body.speed * c, body.speed * s
-    return found
-
-
-def cast(place: Placement, azimuths: Array, elevations: Array, depths: Depths) -> Array:
-    """Where rays from a place end, (N, 3) in its own axes: x ahead, y left, z up, m; beyond all ranges in the sky.
+def cast(place: Placement, azimuths: Array, elevations: Array, views: Views) -> Array:
+    """Where rays from a place end in its own axes, and what they see: (N, 2 + K) with x ahead, y left, z up, m, beyond
+    all ranges in the sky, and the pixels of the other pictures.
 
     azimuths, elevations: N angles in rad, to the left and up, these at most STEEPEST."""
-    ends = np.empty((len(azimuths), 3))
+    found: list[tuple[Array, Array]] = []
     steepest = float(np.abs(np.tan(elevations)).max(initial=0.0)) / math.cos(SECTOR / 2)
     focal = 1 / PIXEL
     size = math.ceil(2 * math.tan(SECTOR / 2) * focal), 2 * math.ceil(steepest * focal) + 2
@@ -180,17 +132,21 @@ def cast(place: Placement, azimuths: Array, elevations: Array, depths: Depths) -
             view.pose, height=view.z, pitch=view.pitch, fov=math.degrees(SECTOR), size=size, roll=view.roll
         )
         c, s = math.cos(turned), math.sin(turned)
-        x, y, z = _ends(camera, azimuths[here] - turned, elevations[here], depths(camera))
-        ends[here] = np.column_stack((c * x - s * y, s * x + c * y, z))
+        x, y, z, *others = _ends(camera, azimuths[here] - turned, elevations[here], views(camera))
+        found.append((here, np.column_stack((c * x - s * y, s * x + c * y, z, *others))))
+    ends = np.empty((len(azimuths), found[0][1].shape[1] if found else 3))
+    for here, values in found:
+        ends[here] = values
     return ends
 
 
-def _ends(camera: PinholeCamera, azimuths: Array, elevations: Array, depth: Array) -> tuple[Array, Array, Array]:
-    """Where rays end in the axes of a camera that sees them: ahead, left, up."""
+def _ends(camera: PinholeCamera, azimuths: Array, elevations: Array, pictures: Array) -> tuple[Array, ...]:
+    """Where rays end in the axes of a camera that sees them: ahead, left, up; and the pixels of the other pictures."""
     width, height = camera.size
     columns = width / 2 - np.tan(azimuths) * camera.focal
     rows = height / 2 - np.tan(elevations) / np.cos(azimuths) * camera.focal
     column = np.clip(columns.astype(int), 0, width - 1)
     row = np.clip(rows.astype(int), 0, height - 1)
-    ahead = depth[row, column].astype(float)
-    return ahead, ahead * (width / 2 - column - 0.5) / camera.focal, ahead * (height / 2 - row - 0.5) / camera.focal
+    ahead, *others = pictures[row, column].astype(float).T
+    left, up = (width / 2 - column - 0.5) / camera.focal, (height / 2 - row - 0.5) / camera.focal
+    return ahead, ahead * left, ahead * up, *others

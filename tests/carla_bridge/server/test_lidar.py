@@ -1,4 +1,4 @@
-"""Lidar and radar before a flat ground and a wall whose distances are known."""
+"""Rays and a lidar before a flat ground and a wall whose distances are known."""
 
 from __future__ import annotations
 
@@ -9,18 +9,8 @@ import pytest
 
 from caldrive.carla_bridge.axes import Placement
 from caldrive.carla_bridge.server.layouts import ActorDescription, AttributeValue
-from caldrive.carla_bridge.server.ranging import (
-    Array,
-    Rays,
-    cast,
-    detections,
-    lidar_settings,
-    radar_settings,
-    scan,
-    velocities,
-)
+from caldrive.carla_bridge.server.lidar import Array, Rays, cast, lidar_settings, scan
 from caldrive.carla_bridge.server.wire import Refusal
-from caldrive.datatypes import PedestrianState, Pose, VehicleState
 from caldrive.world.rendering.pinhole import PinholeCamera
 
 WALL = 10.0  # m: where x is that, there is a wall
@@ -36,7 +26,7 @@ def depths(camera: PinholeCamera) -> Array:
     with np.errstate(divide="ignore"):
         ground = np.where(ways[..., 2] < 0, -view.position[2] / ways[..., 2], FAR)
         wall = np.where(ways[..., 0] > 0, (WALL - view.position[0]) / ways[..., 0], FAR)
-    return np.minimum(np.minimum(ground, wall), FAR)
+    return np.minimum(np.minimum(ground, wall), FAR)[..., None]
 
 
 def rays(delta: float = 0.1) -> Rays:
@@ -107,27 +97,6 @@ def test_noise_moves_points_along_their_rays() -> None:
     off = np.linalg.norm(noisy, axis=1) - np.linalg.norm(exact, axis=1)
     assert np.std(off) == pytest.approx(0.1, rel=0.1)
     assert np.cross(noisy, exact) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_radar_tells_how_fast_things_come_nearer() -> None:
-    radar = radar_settings(asked(points_per_second="20000"))
-    found = detections(radar, Placement(z=1.0), (3.0, 0.0), [], rays())
-    ahead = np.abs(found[:, 1]) + np.abs(found[:, 2]) < 0.01
-    assert ahead.any()
-    assert found[ahead, 0] == pytest.approx(-3.0, abs=0.01)
-    assert found[ahead, 3] == pytest.approx(WALL, rel=0.01)
-    assert np.abs(found[:, 1:3]).max() < math.radians(15.2)
-    leaving = VehicleState(Pose(WALL + 1.9, 0.0, 0.0), speed=5.0, length=4.0, width=8.0)
-    found = detections(radar, Placement(z=1.0), (3.0, 0.0), [leaving], rays())
-    ahead = np.abs(found[:, 1]) + np.abs(found[:, 2]) < 0.01
-    assert found[ahead, 0] == pytest.approx(2.0, abs=0.01)
-
-
-def test_a_point_moves_as_the_body_that_it_is_on() -> None:
-    car = VehicleState(Pose(10.0, 0.0, math.pi / 2), speed=4.0, length=4.0, width=2.0)
-    person = PedestrianState(Pose(0.0, 5.0, math.pi), speed=1.0, radius=0.3)
-    points = np.array([(10.0, 1.9, 0.5), (12.0, 0.0, 0.5), (10.0, 1.9, 0.0), (0.2, 5.0, 1.0)])
-    assert velocities(points, [car, person]) == pytest.approx(np.array([(0, 4), (0, 0), (0, 0), (-1, 0)]), abs=1e-9)
 
 
 @pytest.mark.parametrize(
