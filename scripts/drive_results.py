@@ -2,8 +2,9 @@
 
     python -m scripts.drive_results [--only unseen/oracle nocrash] [--workers 2] [--keep]
 
-A run that was stopped goes on, also on another machine from the lines that are kept; an episode that one suite shares
-with another is driven once. `--keep` drives nothing and keeps what is there. The HTML reports stay in out/results.
+A run that was stopped goes on, also on another machine of the same kind from the lines that are kept; an episode that
+one suite shares with another is driven once. `--keep` drives nothing and keeps what is there. The HTML reports stay in
+out/results.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ from caldrive.provenance import code_version
 OUT, KEPT = Path("out/results"), Path(__file__).parents[1] / "docs" / "results"
 ORACLE = ["--agent", "oracle"]
 AGENTS = {"oracle": ORACLE, "cal": ["--agent", "cal"]}
+FAST = Path(__file__).with_name("begins_at_60.toml")  # who sees no sign drives as fast as before the first one
 WITHOUT = {  # drivers who know the truth but for something
     "oracle-without-hazards": [*ORACLE, "--blind", "hazard_stop"],
     "oracle-without-distance": [*ORACLE, "--blind", "vehicle_distance"],
     "oracle-without-hazards-and-distance": [*ORACLE, "--blind", "hazard_stop", "--blind", "vehicle_distance"],
     "oracle-without-lights": [*ORACLE, "--blind", "red_light"],
-    "oracle-without-signs": [*ORACLE, "--blind", "speed_sign", "--signs"],
+    "oracle-without-signs": [*ORACLE, "--blind", "speed_sign", "--signs", "--controller", str(FAST)],
     "oracle-with-signs": [*ORACLE, "--signs"],
 }
 SUITES = {  # who drives in each; those that come first are known to the later ones

@@ -10,9 +10,9 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from caldrive.benchmark.metrics import cells, red_light_counts, speeding, touch_rates, wilson
+from caldrive.benchmark.metrics import Cell, cells, red_light_counts, speeding, touch_rates, wilson
 from caldrive.benchmark.published import SYSTEMS, success
-from caldrive.benchmark.report.runs import BenchmarkRun, load_run
+from caldrive.benchmark.report.runs import BenchmarkRun, load_run, suites
 from caldrive.benchmark.suites import COLLISIONS, CONDITIONS, DENSITIES, TrialResult
 from caldrive.driving.tasks import TASKS
 
@@ -35,15 +35,18 @@ def unseen(folder: Path) -> Rows:
         touched = {rate.kind: rate for rate in touch_rates(run.results)}
         met, ran = red_light_counts(run.results)
         yield (
-            name, *(f"{percents[task].percent:.0f} ({_range(percents[task].interval)})" for task in tasks),
+            name, *(_success(percents.get(task)) for task in tasks),
             f"{touched[COLLISIONS[0]].km:.0f}",
             ", ".join(str(touched[kind].count) for kind in reversed(COLLISIONS)), f"{ran} of {met}",
         )  # fmt: skip
 
 
-def _range(interval: tuple[float, float]) -> str:
-    low, high = interval
-    return f"{low:.0f}-{high:.0f}"
+def _success(cell: Cell | None) -> str:
+    """Empty for what was not driven."""
+    if cell is None:
+        return ""
+    low, high = cell.interval
+    return f"{cell.percent:.0f} ({low:.0f}-{high:.0f})"
 
 
 def paper(folder: Path) -> Rows:
@@ -59,12 +62,17 @@ def nocrash(folder: Path) -> Rows:
 def _beside_published(folder: Path, tasks: Sequence[str], systems: Sequence[str]) -> Rows:
     runs = runs_of(folder)
     found = {(name, cell.condition, cell.task): cell for name, run in runs.items() for cell in cells(run.results)}
-    yield "", "task", *runs, *(f"{system} (paper)" for system in systems)
+    of = suites(list(runs.values()))
+    yield "", "task", *runs, *(f"{system} (published)" for system in systems)
     for condition in CONDITIONS:
         for task in tasks:
             ours = [found.get((name, condition, task)) for name in runs]
             texts = ["" if cell is None else f"{cell.percent:.0f}{_spread(cell.deviation)}" for cell in ours]
-            yield condition, task, *texts, *(str(success(system, condition, task)) for system in systems)
+            yield condition, task, *texts, *(_printed(success(system, condition, task, of)) for system in systems)
+
+
+def _printed(percent: int | None) -> str:
+    return "" if percent is None else str(percent)
 
 
 def _spread(deviation: float | None) -> str:

@@ -8,6 +8,7 @@ To add one, give it the same name in each of these; then record and train again:
 * `recordings/writer.py`: FORMAT_VERSION raised; `recordings/check.py`: bins of its histogram, where it is continuous
 * `perception/network/config.py`: its task block; `perception/training/config.py`: its weight in the loss
 * `visualization/gauges.py`: how it is drawn; `benchmark/report/runs.py`: from which error on it counts as wrong
+* `search/config.py`, `search/space.py`: its task, and the paper's figures; `explain/faithfulness.py`: what it is about
 * `control/`: what it changes, if anything
 """
 

@@ -195,7 +195,8 @@ class Contact:
 class Truth:
     """What really is, for referee, recorder and oracle.
 
-    opposite_share, sidewalk_share: shares in [0, 1] of the car's area on the opposite lane and on the sidewalk.
+    opposite_share, sidewalk_share: shares in [0, 1] of the car's area on the opposite lane, and beside the road (on
+    the sidewalk, or beyond it).
     route_done, route_length: metres along the route. goal_distance: straight line to the goal, m.
     """
 

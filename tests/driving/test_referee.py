@@ -70,12 +70,24 @@ def test_a_share_counts_again_after_its_rest(kind: InfractionKind, name: str, th
 
 
 @pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
-def test_others_faults_hide_none_of_ones_own(
+def test_a_collision_is_counted_once_and_is_ones_own_where_any_part_of_it_is(
     kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
 ) -> None:
     theirs, own = ((Contact(contact, "it", threshold + 1, at_fault=fault),) for fault in (False, True))
     seen = watched([frame(0, contacts=theirs), frame(1, contacts=own), frame(2, contacts=theirs)])
-    assert [infraction.at_fault for infraction in seen.infractions] == [False, True]
+    assert [(infraction.time, infraction.at_fault) for infraction in seen.infractions] == [(0.0, True)]
+    seen = watched([frame(0, contacts=theirs), frame(1, contacts=theirs)])
+    assert [infraction.at_fault for infraction in seen.infractions] == [False]
+
+
+@pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)
+def test_a_collision_within_the_rest_counts_when_it_is_over(
+    kind: InfractionKind, contact: ContactKind, threshold: float, rest: int
+) -> None:
+    hard = (Contact(contact, "it", threshold + 1, at_fault=True),)
+    for pause, counted in ((rest - 2, 2), (rest // 2, 1)):
+        seen = watched([frame(i, contacts=hard if i in (5, 5 + pause) else ()) for i in range(rest + 20)])
+        assert kinds(seen) == [kind] * counted
 
 
 @pytest.mark.parametrize(("kind", "contact", "threshold", "rest"), COLLISIONS)

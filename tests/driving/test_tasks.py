@@ -116,7 +116,7 @@ def test_an_unknown_task_names_the_known_ones() -> None:
 
 
 def test_an_unknown_time_limit_is_refused() -> None:
-    with pytest.raises(ValueError, match="found time limit 'none', wanted paper or code"):
+    with pytest.raises(ValueError, match="found time limit 'none', wanted paper, code, nocrash"):
         task_scenarios("town02", "straight", time_limit="none")
 
 

@@ -43,7 +43,7 @@ def test_pictures_are_those_that_the_world_would_have_shown(network: Network, no
     with closing(EmbeddedWorld(CameraConfig())) as world:
         first, scene, rig = world.reset(scenario), world.scene(), CameraRig(world.town)
     posts, question = rig.town.roads.posts, Question("red_light")
-    red = Case(case("red light").situation, posts[0].id, None, question, (scene,), 0)
+    red = Case(case("red light").situation, posts[0].id, None, question, (scene,))
     assert (see(Studio(rig, network), red).images[-1] == first.image).all()
     lane = rig.town.roads.lanes[posts[0].lane]
     before_it = VehicleState(lane.line.pose_at(lane.line.length - 12))

@@ -15,9 +15,9 @@ from caldrive.world.rendering.camera import SceneState
 STATE = SceneState(1, VehicleState(Pose(0.0, 0.0, 0.0)))
 
 
-def case(name: str, episode: int = 0, label: int | None = None, other: str | None = None) -> Case:
+def case(name: str, label: int | None = None, other: str | None = None) -> Case:
     (situation,) = [one for one in SITUATIONS if one.name == name]
-    return Case(situation, "a", other, Question(situation.affordance, label=label), (STATE,), episode)
+    return Case(situation, "a", other, Question(situation.affordance, label=label), (STATE,))
 
 
 def probability(value: float) -> Reply:
@@ -46,7 +46,7 @@ def test_an_effect_is_the_mean_over_cases_with_the_answers_that_flip() -> None:
 
     def changed(episode: int, before: float, after: float, now: float) -> tuple[int, Change]:
         replies = probability(before), probability(after), probability(now)
-        one = Counterfactual(case("red light", episode), change, *replies, different(blank, blank), blank)
+        one = Counterfactual(case("red light"), change, *replies, different(blank, blank), blank)
         return episode, one.summary
 
     found = [changed(0, 0.9, 0.1, 0.8), changed(1, 0.7, 0.6, 0.2)]

@@ -119,3 +119,9 @@ def test_the_newest_of_few_images_comes_last(network: Network) -> None:
     question = Question("hazard_stop")
     assert ask(network, question, images) == ask(network, question, [images[0]] * 5)
     assert gradcam.LAYERS["coarse"] == len(network.backbone.stages) - 1
+
+
+def test_images_of_another_size_end_in_a_sentence(network: Network) -> None:
+    image = np.zeros((144, 320, 3), np.uint8)
+    with pytest.raises(ValueError, match=r"found images of 320 x 144, wanted 200 x 88 .*: give --model"):
+        attend(network, Question("red_light"), [image])

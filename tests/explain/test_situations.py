@@ -77,6 +77,11 @@ def test_without_the_training_kept_episodes_the_folder_is_named(folder: Path) ->
         find_examples(folder, n=1, history=4, seed=0, keys=["elsewhere"])
 
 
+def test_episodes_that_are_too_short_end_in_a_sentence(folder: Path) -> None:
+    with pytest.raises(EpisodeError, match=r"found no situation in .* with 400 frames before it, .*: record longer"):
+        find_examples(folder, n=1, history=400, seed=0)
+
+
 def test_the_sheet_has_a_row_for_each_situation(folder: Path, network: Network, tmp_path: Path) -> None:
     found = find_examples(folder, n=1, history=4, seed=0)
     (tmp_path / "sheet.png").write_bytes(contact_sheet(network, found, width=100))

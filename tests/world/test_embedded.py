@@ -172,6 +172,14 @@ def test_a_long_vehicle_meets_what_stands_far_from_its_middle() -> None:
         assert any(contact.id.startswith("lamp") for contact in world.truth().contacts)
 
 
+def test_a_car_that_turned_around_in_its_lane_drives_on_the_opposite_one(world: EmbeddedWorld) -> None:
+    world.reset(along_the_street())
+    world.displace(left=0.0, turn=math.radians(50.0))
+    assert world.truth().opposite_share < 0.2
+    world.displace(left=0.0, turn=math.radians(130.0))
+    assert world.truth().opposite_share > 0.9
+
+
 def test_a_car_across_the_centre_line_is_on_the_opposite_lane(world: EmbeddedWorld) -> None:
     truths = drive(world, along_the_street(), 60, Control(throttle=0.5, steer=0.08))
     assert truths[0].opposite_share == 0.0

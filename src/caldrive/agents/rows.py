@@ -38,13 +38,13 @@ class AgentEntry:
     """The second camera that it wants, None for most."""
 
 
-def model_path(model: Path | None, agent: str = "cal") -> Path:
-    """The model asked for, or the package's for an agent. Raises FileNotFoundError where there is none."""
+def model_path(model: Path | None, agent: str = "cal", option: str = "--model") -> Path:
+    """The model asked for by an option, or the package's for an agent. Raises FileNotFoundError where there is none."""
     shipped = MODELS / f"{agent}.safetensors"
     if model is None and not shipped.is_file():
         raise FileNotFoundError(
             f"found no trained network in this package, wanted one for the agent {agent}: "
-            f"type --agent oracle, or make one with `caldrive train --agent {agent}` and give it with --model FILE"
+            f"make one with `caldrive train --agent {agent}` and give it with {option} FILE"
         )
     return model or shipped
 

@@ -17,8 +17,8 @@ class AgentSettings:
     by rules; rl learnt by trial and error, rl-oracle drives its policy by the truth; or your own: package.module:Class
     or file.py:Class."""
     model: Path | None = None
-    """The network of the agent, a .safetensors file; without it the one in the package. Your own class may take it,
-    too."""
+    """The network of the agent, a .safetensors file; without it the one in the package, if there is one. Your own class
+    may take it, too."""
     variant: str | None = None
     """Another way in which the agent can drive: avoid-stopping for cil, auxiliary-camera for mp."""
     controller: str = "default"

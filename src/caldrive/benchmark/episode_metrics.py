@@ -74,8 +74,11 @@ def red_lights_obeyed(time: Column, red: Column, speed: Column, run_at: Sequence
     yellow, does not count.
     """
     approaches = stretches(time, red > 0.5, SAME_LIGHT_GAP)
-    starts = time[[approach[0] for approach in approaches]]
-    run = {int(np.searchsorted(starts, seconds, side="right")) - 1 for seconds in run_at}
+    run = {
+        k
+        for k, approach in enumerate(approaches)
+        if any(time[approach[0]] <= seconds <= time[approach[-1]] + SAME_LIGHT_GAP for seconds in run_at)
+    }
     return sum(k not in run and bool(speed[approach].min() < STANDING_SPEED) for k, approach in enumerate(approaches))
 
 

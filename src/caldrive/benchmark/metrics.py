@@ -80,7 +80,7 @@ class Pair:
     def p_value(self) -> float:
         """McNemar's exact test, two-sided: how likely a difference as large is between two that are as good."""
         differ, fewer = self.first_alone + self.second_alone, min(self.first_alone, self.second_alone)
-        return min(1.0, 2 * sum(math.comb(differ, k) for k in range(fewer + 1)) * 0.5**differ)
+        return min(1.0, 2 * sum(math.comb(differ, k) for k in range(fewer + 1)) / (1 << differ))
 
 
 def paired(first: Iterable[TrialResult], second: Iterable[TrialResult]) -> Pair:
@@ -134,8 +134,7 @@ def succeeded(result: TrialResult) -> bool:
 
 
 def is_clean(result: TrialResult) -> bool:
-    """Whether an episode reached its goal without a collision, red light, opposite lane or sidewalk of its own
-    fault."""
+    """Whether an episode reached its goal without an infraction of its own fault; speeding is one where signs count."""
     return succeeded(result) and not any(infraction.at_fault for infraction in result.episode.infractions)
 
 
@@ -174,7 +173,7 @@ class InfractionRate:
 
 
 def infraction_rates(results: Sequence[TrialResult]) -> list[InfractionRate]:
-    """Kilometres driven and infractions of each kind (table 2), whoever's fault they were, as CARLA counts them."""
+    """Kilometres driven and infractions of each kind (table 2), whoever's fault they were, by the suite's rules."""
     return _rates(results, [i for result in results for i in result.episode.infractions])
 
 

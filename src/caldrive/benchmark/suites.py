@@ -94,7 +94,9 @@ def _corl2017(seed: int, time_limit: str, towns: Towns, routes: int = ROUTES_PER
     for condition, town, weather in _by_weather(NEW_WEATHERS):
         for task in TASKS:
             place = towns.get(town, town)
-            chosen = task_scenarios(place, task, weather, seed=_seed(seed, weather), time_limit=time_limit)[:routes]
+            chosen = task_scenarios(
+                place, task, weather, seed=_seed(seed, weather), routes_seed=seed, time_limit=time_limit
+            )[:routes]  # fmt: skip
             for k, scenario in enumerate(chosen):
                 yield Trial(key=f"{town}-w{weather:02d}-{task}-{k:02d}", condition=condition, scenario=scenario)
 
@@ -133,7 +135,7 @@ def _nocrash(seed: int, fatal: tuple[InfractionKind, ...], towns: Towns) -> Iter
                 cars, people = traffic[town]
                 chosen = task_scenarios(
                     towns.get(town, town), "nocrash", weather, cars=cars, people=people, time_limit="nocrash",
-                    name=density, seed=_seed(NOCRASH_SEEDS * seed + repetition, weather),
+                    name=density, seed=_seed(NOCRASH_SEEDS * seed + repetition, weather), routes_seed=seed,
                 )  # fmt: skip
                 for k, scenario in enumerate(chosen):
                     yield Trial(

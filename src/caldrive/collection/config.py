@@ -24,7 +24,7 @@ class CollectConfig:
     """Other cars in half of the episodes. Tailgating episodes have twice as many, the rest a third."""
     people: int = 70
     """Pedestrians."""
-    crossing: float = 0.8
+    crossing: float = 0.64
     """How many times as often as usual pedestrians cross the road: while a network is tested they do so more often
     (section 4)."""
     before_signs: float = 0.35

@@ -10,7 +10,7 @@ import tyro
 from tyro.conf import UseAppendAction
 
 from caldrive.commands.answer import Answer, Configurable, Output
-from caldrive.driving.settings import EpisodeSettings, SeeSettings
+from caldrive.driving.settings import EpisodeSettings, PictureSettings
 from caldrive.progress import Progress
 
 if TYPE_CHECKING:  # it loads numpy, for which --help does not wait
@@ -73,7 +73,7 @@ class ExplainDrive(AttentionSettings, EpisodeSettings, Configurable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExplainPictures(AttentionSettings, SeeSettings, Output):
+class ExplainPictures(AttentionSettings, PictureSettings, Output):
     """Film where the network looks in your own video or pictures."""
 
     out: Path = Path("out/attention.mp4")
@@ -145,7 +145,7 @@ class ExplainCounterfactuals(Output):
     episodes: int = 20
     """Episodes to drive, in these weathers in turn."""
     cases: int = 40
-    """Moments of each situation, at most."""
+    """About so many moments of each situation: of each episode its share, rounded up."""
     cars: int | None = None
     """Other cars; without it what the benchmark's dynamic task prescribes."""
     people: int | None = None

@@ -24,11 +24,11 @@ class Tune(Configurable):
     auto: bool = False
     """Search instead of serving the page."""
     port: int = 8080
-    """Of the page, which only this machine can open."""
+    """Port of the page, which only this machine can open."""
     out: Path = Path("out/tune")
     """Folder for controller.toml, which --controller takes; with --auto also for the trials and a report."""
     workers: int = 2
-    """Processes that drive at the same time in a search."""
+    """With --auto: processes that drive at the same time."""
     tune: Annotated[TuneConfig, arg(name="")] = field(default=TuneConfig(), metadata={"flat": True})
 
     def run(self, progress: Progress) -> Answer:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection
+from dataclasses import replace
 
-from caldrive.datatypes import Contact, LightState, TrafficLight, Truth, VehicleState
+from caldrive.datatypes import Contact, ContactKind, LightState, TrafficLight, Truth, VehicleState
 from caldrive.driving.comfort import comfort
 from caldrive.driving.rules import (
     APART_FRAMES,
@@ -31,9 +32,7 @@ from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 
 GOAL_RADIUS = 2.0  # m
-ROUTE_SHARE = (
-    0.9  # of the route that has to be driven: where start and goal lie near each other, standing is no success
-)
+ROUTE_SHARE = 0.9  # of the route, to be driven: where start and goal lie near each other, standing is no success
 NEVER = -1000  # a frame long before the first one
 MAX_LIGHT_ANGLE = math.radians(60)  # a light further off the ego's heading is for others
 
@@ -86,7 +85,7 @@ class Referee:
         self.infractions: list[Infraction] = []
         self.touches: list[Infraction] = []
         self.outcome: Outcome | None = None
-        self._last_counted: dict[tuple[InfractionKind, bool], int] = {}  # frame of the last one of its kind and fault
+        self._last_counted: dict[InfractionKind, tuple[int, int]] = {}  # frame and number of the last one of its kind
         self._shares = {kind: deque[float](maxlen=RISE_FRAMES + 1) for kind in SHARE_RISE}
         self._contacts = deque[tuple[Contact, ...]](maxlen=MOST_FRAMES)
         self._touched: dict[str, int] = {}  # frame of the last touch, by what was touched
@@ -105,7 +104,8 @@ class Referee:
         self._watch_lights(truth)
         if self._speed.is_too_fast(truth) and self.signs:
             self._count(InfractionKind.SPEEDING, truth)
-            self._last_counted[InfractionKind.SPEEDING, True] = len(self._times)  # it lasts
+            _, number = self._last_counted[InfractionKind.SPEEDING]
+            self._last_counted[InfractionKind.SPEEDING] = len(self._times), number  # it lasts
         self._keep(truth)
         if any(infraction.kind in self.fatal for infraction in self.infractions):
             self.outcome = Outcome.FAILED
@@ -156,15 +156,15 @@ class Referee:
             self._touched[name] = len(self._times)
         if self.rules.collisions is None:
             return
-        for contact in truth.contacts:
-            if (at_fault := self._hit(contact, self.rules.collisions[contact.kind])) is not None:
-                self._count(COLLISION[contact.kind], truth, at_fault)
+        for kind, intensity in self.rules.collisions.items():
+            if (at_fault := self._hit(kind, intensity)) is not None:
+                self._count(COLLISION[kind], truth, at_fault)
 
-    def _hit(self, contact: Contact, intensity: Intensity) -> bool | None:
-        """Whose fault the collision was that contacts like this one add up to, None where they are too soft."""
-        recent = [c for frame in list(self._contacts)[-intensity.frames :] for c in frame if c.kind is contact.kind]
-        is_hard = sum(other.impulse for other in recent) > intensity.least
-        return any(other.at_fault for other in recent) if is_hard else None
+    def _hit(self, kind: ContactKind, intensity: Intensity) -> bool | None:
+        """Whether contacts of a kind that add up to a collision are the ego's fault, None where they are too soft."""
+        recent = [c for frame in list(self._contacts)[-intensity.frames :] for c in frame if c.kind is kind]
+        is_hard = sum(contact.impulse for contact in recent) > intensity.least
+        return any(contact.at_fault for contact in recent) if is_hard else None
 
     def _watch_lights(self, truth: Truth) -> None:
         if self._last is None:
@@ -174,14 +174,14 @@ class Referee:
                 self._count(CROSSING[light.state], truth, at_fault=light.state is LightState.RED)
 
     def _count(self, kind: InfractionKind, truth: Truth, at_fault: bool = True) -> None:
-        """One more infraction, unless one of its kind was counted shortly before; others' faults hide none of one's
-        own."""
-        frame, rest = len(self._times), REST_FRAMES[kind]
-        for fault in (True,) if at_fault else (True, False):
-            if frame - self._last_counted.get((kind, fault), NEVER) <= rest:
-                return
-        self._last_counted[kind, at_fault] = frame
-        self.infractions.append(_infraction(kind, truth, at_fault))
+        """One more infraction, unless one of its kind was counted shortly before: that becomes the ego's own where this
+        is."""
+        frame, (before, number) = len(self._times), self._last_counted.get(kind, (NEVER, NEVER))
+        if frame - before > REST_FRAMES[kind]:
+            self._last_counted[kind] = frame, len(self.infractions)
+            self.infractions.append(_infraction(kind, truth, at_fault))
+        elif at_fault and not self.infractions[number].at_fault:
+            self.infractions[number] = replace(self.infractions[number], at_fault=True)
 
     def _keep(self, truth: Truth) -> None:
         """What the result is made of."""

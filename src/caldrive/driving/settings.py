@@ -16,8 +16,8 @@ class WorldSettings:
     """In which world somebody drives."""
 
     world: str = "embedded"
-    """Where the agent drives: embedded, carla (a server that runs), or your own: package.module:Class or
-    file.py:Class."""
+    """Where the agent drives: embedded, carla (a server that runs), or, but for a benchmark, your own:
+    package.module:Class or file.py:Class."""
     host: str = "127.0.0.1"
     """The machine where CARLA runs, for --world carla."""
     port: int = 2000
@@ -73,8 +73,7 @@ class DriveSettings(EpisodeSettings):
     episodes: int = 1
     """How many episodes, one for each route from --route on."""
     video: bool = True
-    """Film the drive. --no-video leaves out drive.mp4 and the plots of speed (PNG), and writes each episode's trace
-    (episode-000.json) alone."""
+    """--video films the drive and plots the speed; --no-video writes each episode's trace (episode-000.json) alone."""
     record: Annotated[Path | None, arg(metavar="FILE.mcap")] = None
     """Record the drive for Foxglove, Lichtblick or Rerun: camera, affordances, controller, signals, map, others and
     infractions, all episodes in one file. Needs pip install 'caldrive[record]'."""
@@ -127,9 +126,8 @@ class AgentSpeedSettings(AgentSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeeSettings:
-    """Run the network on your own video or pictures. It knows only the embedded towns: in other pictures its values
-    may mean nothing."""
+class PictureSettings:
+    """A person's own video or pictures, and the network that looks at them."""
 
     source: Annotated[Positional[Path], arg(metavar="VIDEO_OR_FOLDER")]
     """A video, a folder of pictures (.png, .jpg; by name, 10 a second), or one picture."""
@@ -143,5 +141,12 @@ class SeeSettings:
     """Take only every Nth picture: the network learnt at 10 a second, so that 3 suits a video of 30."""
     out: Path = Path("out/see.mp4")
     """The video to write, an .mp4 file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeeSettings(PictureSettings):
+    """Run the network on your own video or pictures. It knows only the embedded towns: in other pictures its values
+    may mean nothing."""
+
     values: Path | None = None
     """The affordances of every picture, a .csv or .parquet file; without it a .csv beside the video."""

@@ -144,7 +144,7 @@ def _time_limit(town: str, start: Pose, goal: Pose, kind: str) -> float:
 def time_limit_of(length: float, kind: str) -> float:
     """Seconds for a route of a length in m. kind: a name in TIME_LIMITS. Raises ValueError for another."""
     if kind not in TIME_LIMITS:
-        raise ValueError(f"found time limit {kind!r}, wanted paper or code: type --time-limit paper")
+        raise ValueError(f"found time limit {kind!r}, wanted {', '.join(TIME_LIMITS)}: type --time-limit paper")
     speed, beside = TIME_LIMITS[kind]
     return length / (speed * KMH) + beside
 
@@ -157,6 +157,7 @@ def task_scenarios(
     cars: int | None = None,
     people: int | None = None,
     seed: int = 0,
+    routes_seed: int | None = None,
     time_limit: str = "paper",
     name: str | None = None,
 ) -> list[Scenario]:
@@ -164,6 +165,7 @@ def task_scenarios(
 
     cars, people: None takes the protocol's: none, and in the dynamic task 20 + 50 (town01) or 15 + 50 (town02); in
     generated towns as many for their roads as in town01.
+    routes_seed: decides the routes on a map that is not the package's; None takes the seed.
     task: `nocrash` has that benchmark's routes. time_limit: a name in TIME_LIMITS. name: the scenarios' task,
     where it is called something else. Raises ValueError for an unknown task or time limit.
     """
@@ -174,7 +176,7 @@ def task_scenarios(
             n_pedestrians=usual[1] if people is None else people, time_limit=_time_limit(town, start, goal, time_limit),
             seed=seed * 1000 + i, task=name or task,
         )
-        for i, (start, goal) in enumerate(routes(town, task, seed))
+        for i, (start, goal) in enumerate(routes(town, task, seed if routes_seed is None else routes_seed))
     ]  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from caldrive.driving.pictures import open_source
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import rollout
 from caldrive.driving.see import at_size, kept_rows, parse_crop
-from caldrive.driving.settings import EpisodeSettings, SeeSettings
+from caldrive.driving.settings import EpisodeSettings, PictureSettings
 from caldrive.driving.setup import set_up
 from caldrive.explain.gradcam import Attention, Question, attend
 from caldrive.explain.overlay import explained, scale_of
@@ -54,15 +54,17 @@ class Looked:
 def drive_attention(
     settings: EpisodeSettings, affordances: Sequence[str], layer: str, out: Path, progress: Progress = silent
 ) -> int:
-    """Drives an episode and writes the video of where the network `settings.model` looks, whoever drives; returns its
-    number of frames. Raises ValueError for settings that cannot be."""
+    """Drives an episode and writes the video of where CAL's network looks (that of `settings` where it drives, else the
+    package's); returns its number of frames. Raises ValueError for settings that cannot be."""
     questions = _checked(affordances, out)
     network, _ = load_network(model_path(settings.model if settings.agent == "cal" else None))
     scenes = _driven(settings)
     return _write(network, scenes, questions, layer, out, 10.0, progress)
 
 
-def see_attention(settings: SeeSettings, affordances: Sequence[str], layer: str, progress: Progress = silent) -> int:
+def see_attention(
+    settings: PictureSettings, affordances: Sequence[str], layer: str, progress: Progress = silent
+) -> int:
     """The same for a person's own pictures, as `caldrive see` takes them."""
     questions = _checked(affordances, settings.out)
     require_within("--every", settings.every, 1, 1_000_000, 1)
@@ -92,7 +94,7 @@ def _driven(settings: EpisodeSettings) -> Iterator[Scene]:
                 return
 
 
-def _pictures(settings: SeeSettings, size: tuple[int, int]) -> Iterator[Scene]:
+def _pictures(settings: PictureSettings, size: tuple[int, int]) -> Iterator[Scene]:
     """A person's own pictures in the network's size (height, width)."""
     source, command = open_source(settings.source, settings.every), Command(settings.command)
     crop = None if settings.crop is None else parse_crop(settings.crop)

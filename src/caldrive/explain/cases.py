@@ -20,7 +20,6 @@ from caldrive.explain.gradcam import Question
 from caldrive.explain.situations import NEAR_CAR
 from caldrive.geometry import moved, to_local
 from caldrive.interfaces import Agent
-from caldrive.progress import Progress, silent
 from caldrive.scenarios import Scenario
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import SceneState
@@ -59,7 +58,7 @@ class Moment:
         people, cars = A2.among(self.axle, self.truth.pedestrians), A2.among(self.axle, self.truth.vehicles)
         return [person for _, person in people], [car for _, car in cars]
 
-    def beside(self, things: Sequence[Thing], concern: Sequence[Thing]) -> str | None:
+    def nearest_other(self, things: Sequence[Thing], concern: Sequence[Thing]) -> str | None:
         """The id of the nearest in view of some things that are of no concern."""
         free = [(self.seen_at(thing.pose), thing) for thing in things if thing not in concern]
         seen = [(at[0], thing.id) for at, thing in free if _in_view(*at)]
@@ -94,7 +93,6 @@ class Case:
     question: Question
     states: tuple[SceneState, ...]
     """Of the frames that the network looks at, the oldest first."""
-    episode: int
 
 
 def _in_view(ahead: float, left: float) -> bool:
@@ -112,7 +110,7 @@ def _light(is_red: bool) -> Callable[[Moment], Subject | None]:
             of_concern = [light for light in of_concern if light.state is not LightState.GREEN]
         one = of_concern[0]
         others = [light for light in truth.lights if _is_seen(light, axle) and _distance(light, one) > APART]
-        return one.id, moment.beside(others, of_concern)
+        return one.id, moment.nearest_other(others, of_concern)
 
     return subject
 
@@ -131,7 +129,7 @@ def _person(moment: Moment) -> Subject | None:
     people, cars = moment.in_the_way()
     if len(people) != 1 or cars:
         return None
-    return people[0].id, moment.beside(moment.truth.pedestrians, people)
+    return people[0].id, moment.nearest_other(moment.truth.pedestrians, people)
 
 
 def _car_in_the_way(moment: Moment) -> Subject | None:
@@ -139,7 +137,7 @@ def _car_in_the_way(moment: Moment) -> Subject | None:
     if people or len(cars) != 1 or not truth.affordances.hazard_stop:
         return None
     of_concern = [*cars, *(car for _, car in A3.among(moment.axle, truth.vehicles))]  # the areas differ in width
-    return cars[0].id, moment.beside(truth.vehicles, of_concern)
+    return cars[0].id, moment.nearest_other(truth.vehicles, of_concern)
 
 
 def _car_ahead(moment: Moment) -> Subject | None:
@@ -147,7 +145,7 @@ def _car_ahead(moment: Moment) -> Subject | None:
     cars = [car for _, car in A3.among(moment.axle, truth.vehicles)]
     if len(cars) != 1 or truth.affordances.vehicle_distance >= NEAR_CAR:
         return None
-    return cars[0].id, moment.beside(truth.vehicles, cars)
+    return cars[0].id, moment.nearest_other(truth.vehicles, cars)
 
 
 def _sign(moment: Moment) -> Subject | None:
@@ -191,14 +189,13 @@ SITUATIONS = (
 
 
 def find_cases(
-    world: EmbeddedWorld, agent: Agent, scenario: Scenario, *, episode: int, span: int, seed: int,
-    progress: Progress = silent,
-) -> list[Case]:  # fmt: skip
+    world: EmbeddedWorld, agent: Agent, scenario: Scenario, *, span: int, rng: np.random.Generator
+) -> list[Case]:
     """Drives an episode; returns a random moment of each situation for each thing that decides it. span: frames that a
-    network looks at; progress: hears the share of the route that is driven."""
-    rng, counts = np.random.default_rng([seed, episode]), Counter[tuple[str, str]]()
+    network looks at."""
+    counts = Counter[tuple[str, str]]()
     chosen: dict[tuple[str, str], Case] = {}
-    for case in _moments(world, agent, scenario, episode=episode, span=span, progress=progress):
+    for case in _moments(world, agent, scenario, span):
         key = case.situation.name, case.subject
         counts[key] += 1
         if rng.random() < 1 / counts[key]:  # each moment is as likely to stay
@@ -206,21 +203,17 @@ def find_cases(
     return list(chosen.values())
 
 
-def _moments(
-    world: EmbeddedWorld, agent: Agent, scenario: Scenario, *, episode: int, span: int, progress: Progress
-) -> Iterator[Case]:
+def _moments(world: EmbeddedWorld, agent: Agent, scenario: Scenario, span: int) -> Iterator[Case]:
     """Every moment of every situation in an episode, from the first one on that has a whole history."""
     history, referee = deque[SceneState](maxlen=span), Referee(scenario)
     for step in rollout(world, agent, scenario):
         history.append(world.scene())
         truth = step.truth
         moment = Moment(truth, moved(truth.ego.pose, world.vehicle.front_axle), world.town, scenario.weather)
-        done = max(truth.route_done / truth.route_length, truth.time / scenario.time_limit)
-        progress("driving", min(1.0, done))
         for situation in SITUATIONS if len(history) == span else ():
             if found := situation.subject(moment):
                 label = truth.affordances.speed_sign if situation.affordance == "speed_sign" else None
                 question = Question(situation.affordance, step.observation.command, label)
-                yield Case(situation, *found, question, tuple(history), episode)
+                yield Case(situation, *found, question, tuple(history))
         if referee.watch(truth) is not None:
             return

@@ -11,6 +11,8 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from caldrive.agents.settings import AgentSettings
 from caldrive.datatypes import Observation
 from caldrive.driving.setup import set_up
@@ -90,7 +92,8 @@ def _seen(
 ) -> Iterator[Seen]:
     """The cases of an episode as the network sees them, of each situation as many as are its share."""
     counts = Counter[str]()
-    cases = find_cases(world, oracle, scenario, episode=episode, span=studio.network.span, seed=config.seed)
+    rng = np.random.default_rng([config.seed, episode])
+    cases = find_cases(world, oracle, scenario, span=studio.network.span, rng=rng)
     for case in cases:
         counts[case.situation.name] += 1
         if counts[case.situation.name] <= config.most:

@@ -24,7 +24,7 @@ from caldrive.world.rendering.camera import CameraRig
 
 DIFFERENT = 8  # grey levels from which on a pixel is seen to be another
 FEWEST_EPISODES = 5  # of which an interval says anything
-FEWEST_PIXELS = 8  # that have to change for a thing to be seen at all: a lamp is small
+FEWEST_CHANGED = 8  # that have to change for a thing to be seen at all: a lamp is small
 RESAMPLES, LOW, HIGH = 2000, 2.5, 97.5  # of the bootstrap, and the percentiles of its interval
 Values = Sequence[tuple[int, float]]  # of cases, each with its episode
 Mask = NDArray[np.bool_]
@@ -58,7 +58,7 @@ class Studio:
         """The classes (H, W) of the last one's pixels."""
         thing = intervention.thing(case)
         assert thing is not None
-        state = intervention.change(self.rig.town, case.states[-1], thing)
+        state = intervention.edit(self.rig.town, case.states[-1], thing)
         return self.rig.render_semantics(state, [self.camera])[0]
 
 
@@ -128,7 +128,7 @@ class Counterfactual:
     @property
     def is_seen(self) -> bool:
         """Whether there is anything to see of what is changed."""
-        return int(self.where.sum()) >= FEWEST_PIXELS
+        return int(self.where.sum()) >= FEWEST_CHANGED
 
     @property
     def change(self) -> float:

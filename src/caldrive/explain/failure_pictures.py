@@ -43,8 +43,8 @@ STILL = replace(CameraConfig(), width=320, height=141)
 QUALITY = JPEG | {"quality": 65}
 LAYER = "fine"  # the coarse one does not tell a lamp from the house behind it
 SAME = 0.01  # m, within which a car is at the same place
-NO_NETWORK = "No attention is drawn: it was not driven by caldrive's network, which could be asked."
-OTHERWISE = "It went otherwise when it was driven again: the agent does not do the same each time."
+NO_NETWORK = "No attention: only CAL's own network can show where it looks."
+OTHERWISE = "Driven again, the episode went differently: this agent does not do the same each time."
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ ABOUT = {
     "vehicle_distance": (Semantic.VEHICLE,), "relative_angle": (Semantic.ROAD, Semantic.LINE),
     "center_distance": (Semantic.ROAD, Semantic.LINE),
 }  # fmt: skip
-TOLERANCE = 6  # pixels of an image 200 wide: the usual 15 of one of 500
+TOLERANCE = 0.03  # of an image's width: the usual 15 pixels of 500
 STEPS = 16  # of a deletion or an insertion
 BLUR = 8.0  # pixels, standard deviation of what takes a deleted place
 
@@ -44,7 +44,7 @@ def about(affordance: str, semantics: NDArray[np.uint8]) -> Mask:
 
 def points_at(one: Map, mask: Mask) -> bool:
     """Pointing game: whether the place of most attention is on the thing, or nearly. one: at the size of the mask."""
-    near = binary_dilation(mask, iterations=TOLERANCE)
+    near = binary_dilation(mask, iterations=round(TOLERANCE * mask.shape[1]))
     return bool(near[np.unravel_index(np.abs(one).argmax(), one.shape)])
 
 
@@ -56,7 +56,8 @@ def energy_inside(one: Map, mask: Mask) -> float:
 
 @dataclass(frozen=True)
 class Curve:
-    """Means of what a network says while an image is deleted or inserted place by place, in [0, 1]: 1 as at first."""
+    """Means of what a network says while an image is deleted or inserted place by place: the probability of the class,
+    or of a value how near it is to the first, in [0, 1]."""
 
     deletion: float
     """Low where the map found what the network needs."""

@@ -44,7 +44,7 @@ class Question:
         """Raises ValueError where there is no such affordance or class."""
         if self.affordance not in BY_NAME:
             raise ValueError(
-                f"found affordance {self.affordance!r}, wanted one of {', '.join(BY_NAME)}: type --affordance red_light"
+                f"found affordance {self.affordance!r}, wanted one of {', '.join(BY_NAME)}: type one of them"
             )
         if self.label is not None and self.label not in self.spec.classes:
             classes = ", ".join(map(str, self.spec.classes)) or "none, as it is a number"
@@ -74,7 +74,7 @@ class Reply:
 
 @dataclass(frozen=True)
 class Attention:
-    """What a reply is made from, in the images before it."""
+    """What a reply is made from, in the images that the block looks at."""
 
     reply: Reply
     maps: tuple[Map, ...]
@@ -140,7 +140,14 @@ def require_captum() -> Any:
 
 
 def _batch(network: Network, question: Question, images: Sequence[Image]) -> Tensor:
-    """The images (T, 3, H, W) that the block looks at."""
+    """The images (T, 3, H, W) that the block looks at. Raises ValueError where they are of another size than the
+    network's."""
+    (height, width), wanted = images[-1].shape[:2], network.config.image_size
+    if (height, width) != wanted:
+        raise ValueError(
+            f"found images of {width} x {height}, wanted {wanted[1]} x {wanted[0]} as this network takes them: give "
+            "--model with one for these"
+        )
     last = len(images) - 1
     chosen = [images[max(0, last - frames)] for frames in frames_back(network, question.affordance)]
     return normalise(to_float(np.stack(chosen)))

@@ -12,7 +12,7 @@ from caldrive.world.rendering.repainting import Repainting, sign_with, without_c
 from caldrive.world.scene.people import Shown
 from caldrive.world.town import Town
 
-Change = Callable[[Town, SceneState, str], SceneState]  # of a scene, by the id of the thing that is changed
+SceneEdit = Callable[[Town, SceneState, str], SceneState]  # of a scene, by the id of the thing that is changed
 
 
 def _unchanged(town: Town, state: SceneState, id: str) -> SceneState:
@@ -25,7 +25,7 @@ def _post(town: Town, id: str) -> list[str]:
     return [post.id for post in town.roads.posts if post.stands_at == foot]
 
 
-def _lamp(shown: LightState) -> Change:
+def _lamp(shown: LightState) -> SceneEdit:
     def change(town: Town, state: SceneState, id: str) -> SceneState:
         return replace(state, lights={**state.lights, **dict.fromkeys(_post(town, id), shown)})
 
@@ -45,7 +45,7 @@ def _without_car(town: Town, state: SceneState, id: str) -> SceneState:
     return replace(state, vehicles=[car for car in state.vehicles if car.id != id])
 
 
-def _only(part: Shown) -> Change:
+def _only(part: Shown) -> SceneEdit:
     return lambda town, state, id: replace(state, shown={**state.shown, id: part})
 
 
@@ -62,7 +62,7 @@ class Intervention:
     situation: str
     """By its name."""
     name: str
-    change: Change = _unchanged
+    edit: SceneEdit = _unchanged
     """Of what moves or shines, in each frame."""
     paint: Callable[[Town, str], Repainting] | None = None
     """Of what stands still."""
@@ -87,11 +87,11 @@ class Intervention:
         if thing is None:
             raise ValueError(f"found no other thing at a {case.situation.name}, wanted one: leave this control out")
         painted = rig if self.paint is None else rig.repainted(self.paint(rig.town, thing))
-        states = [self.change(rig.town, case.states[frame], thing) for frame in frames]
+        states = [self.edit(rig.town, case.states[frame], thing) for frame in frames]
         return [painted.render(state, [camera])[0] for state in states]
 
 
-def _control(situation: str, name: str, change: Change) -> Intervention:
+def _control(situation: str, name: str, change: SceneEdit) -> Intervention:
     """Something done to what is of no concern."""
     return Intervention(situation, name, change, control=True, of_other=True)
 

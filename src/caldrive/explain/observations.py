@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from caldrive.datatypes import Semantic
-from caldrive.explain.counterfactuals import FEWEST_PIXELS, Counterfactual, Mask, Seen, Values, interval, score
+from caldrive.explain.counterfactuals import FEWEST_CHANGED, Counterfactual, Mask, Seen, Values, interval, score
 from caldrive.explain.faithfulness import energy_inside
 from caldrive.explain.gradcam import upsampled
 from caldrive.explain.interventions import (
@@ -74,7 +74,7 @@ def _on_legs(seen: Seen, changed: Changed) -> float | None:
     person = (semantics == Semantic.PERSON) & (
         seen.studio.semantics(seen.case, changed[AWAY].intervention) != Semantic.PERSON
     )
-    if person.sum() < FEWEST_PIXELS:
+    if person.sum() < FEWEST_CHANGED:
         return None
     large = upsampled(seen.attention.now, person.shape)
     whole = energy_inside(large, person)

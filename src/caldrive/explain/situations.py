@@ -19,7 +19,7 @@ from caldrive.recordings.writer import EpisodeError
 Rows = NDArray[np.bool_]
 NEAR_CAR = 20.0  # m
 BEND = 0.15  # rad, from which a way is no longer straight
-FEWEST_PIXELS = 20  # that a thing takes in the image, to be seen at all
+FEWEST_SHOWN = 20  # that a thing takes in the image, to be seen at all
 MIDDLE = 1  # the number of the camera in the car's middle
 
 
@@ -93,14 +93,15 @@ def find_examples(
 ) -> dict[str, list[Example]]:
     """Up to n frames of each situation, no two of one episode, by its name. history: frames before each.
 
-    keys: of the episodes to look in, None for all. Raises EpisodeError where none of them is in the folder.
+    keys: of the episodes to look in, None for all. Raises EpisodeError where none of them is in the folder, or nothing
+    in them.
     """
     rng = np.random.default_rng(seed)
     paths = [path for path in episode_paths(folder) if keys is None or read_episode(path, images=False).key in keys]
     if not paths:
         raise EpisodeError(
             f"found none of the episodes in {folder} that the network's training kept for validation: give the folder "
-            "that it was trained on with --data, or leave --held-out away"
+            "that it was trained on, or leave --held-out out"
         )
     found: dict[str, list[Example]] = {situation.name: [] for situation in SITUATIONS}
     for index in rng.permutation(len(paths)):
@@ -110,6 +111,10 @@ def find_examples(
         for example in _examples(episode, history, rng):
             if len(found[example.situation.name]) < n:
                 found[example.situation.name].append(example)
+    if not any(found.values()):
+        raise EpisodeError(
+            f"found no situation in {folder} with {history} frames before it, wanted one: record longer episodes"
+        )
     return found
 
 
@@ -132,4 +137,4 @@ def _examples(episode: Episode, history: int, rng: np.random.Generator) -> Itera
 def _shows(semantics: NDArray[np.uint8], wanted: tuple[Semantic, ...]) -> bool:
     """Whether enough of the first class is seen, and more than of the others."""
     counts = [int((semantics == one).sum()) for one in wanted]
-    return not counts or (counts[0] >= FEWEST_PIXELS and counts[0] == max(counts))
+    return not counts or (counts[0] >= FEWEST_SHOWN and counts[0] == max(counts))

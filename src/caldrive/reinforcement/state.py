@@ -78,9 +78,9 @@ def digests(config: ReinforcementConfig) -> dict[str, str]:
     """Of the networks that a training sees by, by their setting."""
     files = {}
     if config.sees == "features":
-        files["encoder"] = model_path(config.encoder, "mp")
+        files["encoder"] = model_path(config.encoder, "mp", "--encoder")
     if config.sees == "affordances" and config.affordances == "predicted":
-        files["perception"] = model_path(config.perception)
+        files["perception"] = model_path(config.perception, option="--perception")
     return {name: file_digest(path) for name, path in files.items()}
 
 

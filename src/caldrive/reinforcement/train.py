@@ -37,7 +37,7 @@ def train_rl(
     called unfinished.safetensors. `stop` may end the run early after an update. Raises ValueError or FileNotFoundError
     for settings that cannot be, and ValueError where another process works in `out`.
     """
-    encoder = load_encoder(model_path(config.encoder, "mp")) if config.sees == "features" else None
+    encoder = load_encoder(model_path(config.encoder, "mp", "--encoder")) if config.sees == "features" else None
     env_config(config, encoder)
     folder = TrainingFolder(Path(out))
     with locked_folder(Path(out)):

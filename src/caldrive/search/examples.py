@@ -31,8 +31,9 @@ from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError
 from caldrive.scenarios import require_to_learn_from
 from caldrive.search.config import SearchConfig
+from caldrive.search.space import LONGEST_SPAN
 
-HISTORY = 60  # frames at an episode's beginning that are history only, for all blocks; the longest looks at 58
+HISTORY = LONGEST_SPAN + 2  # frames at an episode's beginning that are history only, for all blocks
 PARTS = ("training", "validation")
 
 

@@ -21,6 +21,7 @@ from caldrive.search.space import PUBLISHED, PUBLISHED_TEMPORAL
 from caldrive.search.studies import importances
 
 PAGE, PICTURE, BLOCKS = "report.md", "parameters.png", "blocks.toml"
+PARAMETERS = ("type", "nodes", "dropout", "frames", "every n-th")  # of a block
 
 
 def write_report(findings: SearchResult, source: Source, config: SearchConfig) -> Path:
@@ -91,8 +92,7 @@ def _parameters(block: BlockConfig) -> list[str]:
 
 
 def _best_blocks(findings: SearchResult) -> str:
-    names = ("type", "nodes", "p", "seq", "dil")
-    head = ["task", *names, *(f"{name}, paper" for name in names)]
+    head = ["task", *PARAMETERS, *(f"{name}, paper" for name in PARAMETERS)]
     rows = (
         [BY_NAME[task.task].title, *_parameters(task.best.block), *_parameters(getattr(PUBLISHED, task.task))]
         for task in findings.tasks
@@ -101,7 +101,7 @@ def _best_blocks(findings: SearchResult) -> str:
 
 
 def _trained_again(findings: SearchResult) -> str:
-    head = ("task", "trial", "type", "nodes", "p", "seq", "dil", "in the search", "again")
+    head = ("task", "trial", *PARAMETERS, "in the search", "again")
     rows = (
         [
             BY_NAME[task.task].title,

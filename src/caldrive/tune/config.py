@@ -26,13 +26,13 @@ class CostWeights:
     """How much each part of a drive's cost counts; `tune/cost.py` has their units."""
 
     time: float = 1.0
-    """Of the share of the time limit that the drive takes."""
+    """Weight of the share of the time limit that the drive takes."""
     jerk: float = 1.0
-    """Of the RMS jerk, in units of nuPlan's bound of 8.37 m/s³."""
+    """Weight of the RMS jerk, in units of nuPlan's bound of 8.37 m/s³."""
     center: float = 1.0
-    """Of the mean distance to the centre line, in units of the paper's 0.334 m."""
+    """Weight of the mean distance to the centre line, in units of the paper's 0.334 m."""
     infraction: float = 1.0
-    """Of each infraction, and of a goal that is not reached."""
+    """Weight of each infraction, and of a goal that is not reached."""
 
     def __post_init__(self) -> None:
         usual = {field.name: field.default for field in fields(self)}
@@ -46,17 +46,17 @@ class TuneConfig:
     """A search for the controller's constants with the least cost."""
 
     trials: int = 100
-    """Controllers that are tried. More of them go on with a search that is finished."""
+    """With --auto: controllers that are tried. More of them go on with a search that is finished."""
     maneuvers: tuple[ManeuverName, ...] = MANEUVER_NAMES
-    """What is driven on a single road."""
+    """With --auto: what is driven on a single road."""
     routes: int = 2
-    """Of town01, among cars and people. As many others judge the result."""
+    """With --auto: routes of town01 that are driven among cars and people. As many others judge the result."""
     constants: tuple[str, ...] = SEARCHED
-    """The constants that are searched, by their names in a controller's file."""
+    """With --auto: the constants that are searched, some of those that are listed here."""
     cost: CostWeights = CostWeights()
-    """What a drive costs."""
+    """With --auto: what a drive costs."""
     seed: int = 0
-    """Decides everything random."""
+    """With --auto: decides everything random."""
 
     def __post_init__(self) -> None:
         usual = {field.name: field.default for field in fields(self)}

@@ -61,13 +61,11 @@ def route(number: int, town: str = "town01") -> Maneuver:
     return Maneuver(f"route {number} of {town}", make_world, scenarios[number])
 
 
-def _on_road(title: str, end: float, seconds: float, road: Callable[[], SingleRoad], start: float = 0.0) -> Maneuver:
+def _on_road(title: str, end: float, seconds: float, road: Callable[[], SingleRoad], left: float = 0.0) -> Maneuver:
     """From the road's beginning, so many metres to the left of its middle, to its arc length `end`."""
     points = road().route
     goal = Pose(end, 0.0, 0.0) if points is None else Polyline(points).pose_at(end)
-    return Maneuver(
-        title, road, Scenario("single road", 1, Pose(0.0, start, 0.0), goal, time_limit=seconds, task=title)
-    )
+    return Maneuver(title, road, Scenario("single road", 1, Pose(0.0, left, 0.0), goal, time_limit=seconds, task=title))
 
 
 def _winding_road() -> Points:

@@ -147,7 +147,11 @@ class TuningPage:
         try:
             write_controller(self.path, self.controller)
         except OSError as error:
-            self.ui.notify(f"found that {self.path} cannot be written ({error.strerror})", type="negative")
+            self.ui.notify(
+                f"found that {self.path} cannot be written ({error.strerror}), wanted a file for the constants: "
+                "end with Ctrl-C and give another --out",
+                type="negative",
+            )
             return
         self.ui.notify(f"saved: caldrive drive --controller {self.path}", type="positive", multi_line=True)
 

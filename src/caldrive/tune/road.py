@@ -31,7 +31,6 @@ from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
 from caldrive.world.truth.labels import A1, label
 
 CAR = VehicleConfig()
-POST_BEHIND_LINE = 6.6  # m from the stop line to the light's post: the bumper is there when the post leaves A1
 LANE = 3.5  # m, its width; the road has one for each direction
 CRASH = 1000.0  # N s, more than any benchmark asks of a collision
 IMAGE = np.full((4, 4, 3), (200, 120, 40), np.uint8)
@@ -60,7 +59,7 @@ class SingleRoad:
     person: Callable[[float], tuple[float, float] | None] | None = None
     """Where a person stands (x, y) at a time, None while away."""
     light: float | None = None
-    """The stop line of a light."""
+    """The stop line of a light, beside which it stands, as in a town."""
     green_at: float = math.inf
     """When the light turns from red to green."""
     signs: tuple[tuple[float, int], ...] = ()
@@ -137,7 +136,7 @@ class SingleRoad:
         line = self.line.pose_at(self.light)
         left, right = moved(line, left=LANE / 2), moved(line, left=-LANE / 2)
         state = LightState.GREEN if self.time >= self.green_at else LightState.RED
-        post = self._post(self.light + POST_BEHIND_LINE)
+        post = self._post(self.light)
         return (TrafficLight("light", post, state, ((left.x, left.y), (right.x, right.y))),)
 
     def _outside(self) -> tuple[float, float]:

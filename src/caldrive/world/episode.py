@@ -81,7 +81,7 @@ class Episode:
         with self._timed("pedestrians"):
             self._pedestrians.step(DT, [ego, *before.vehicles], self._curvature())
         with self._timed("contacts"):
-            contacts = self._resolve_contacts(before)
+            contacts = self._resolve_contacts((*self._cars(before.progress), *self._pedestrians.states()))
         here = self._ego.pose
         progress = self.route.line.project(here.x, here.y, near=before.progress).s
         self._update(time, progress, contacts)
@@ -109,12 +109,11 @@ class Episode:
         """Of the ego's path, as its wheels stand, 1/m."""
         return math.tan(self._ego.steer_angle) / self.vehicle.wheelbase
 
-    def _resolve_contacts(self, before: WorldState) -> tuple[Contact, ...]:
-        """Finds contacts, and lets them act on the ego."""
+    def _resolve_contacts(self, actors: tuple[VehicleState | PedestrianState, ...]) -> tuple[Contact, ...]:
+        """Finds contacts where everybody is now, and lets them act on the ego."""
         ego = self._ego_box()
         here, reach = ego.pose, half_diagonal(ego) + PUSHED
         near = self.town.obstacles.near(here, reach)
-        actors: tuple[VehicleState | PedestrianState, ...] = (*before.vehicles, *before.pedestrians)
         x, y, reach = here.x, here.y, reach + ACTOR_REACH
         near += [
             obstacle_of(actor)

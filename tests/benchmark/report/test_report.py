@@ -121,8 +121,8 @@ def test_missed_goals_say_how_they_began(runs: list[BenchmarkRun]) -> None:
 def test_every_cell_stands_beside_the_papers(runs: list[BenchmarkRun]) -> None:
     success = next(table for table in tables(runs) if table.title == "Success")
     row = dict(zip(success.head, next(r for r in success.rows if r[:2] == ("new town", "navigation")), strict=True))
-    assert row["CAL (paper)"] == "70"
-    assert row["MP (paper)"] == "24"
+    assert row["CAL (published)"] == "70"
+    assert row["MP (published)"] == "24"
     assert "of 2" in row["cal %"]
     assert len(success.rows) == 16
 
@@ -362,7 +362,7 @@ def test_nothing_is_fetched_from_outside(page: Any) -> None:
 
 
 def test_a_click_on_a_head_sorts_by_number_and_another_turns_it_round(page: Any) -> None:
-    head = page.locator("table").nth(1).locator("th button", has_text=re.compile(r"^CAL \(paper\)"))
+    head = page.locator("table").nth(1).locator("th button", has_text=re.compile(r"^CAL \(published\)"))
     head.click()
     up = [int(text) for text in column(page, 1, "CAL")]
     assert up == sorted(up)

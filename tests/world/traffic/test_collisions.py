@@ -102,6 +102,22 @@ def test_being_run_into_from_behind_is_not_the_fault_of_the_ego_and_pushes_it_on
     assert after.pose.x == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize(
+    ("obstacle", "fault"),
+    [
+        (car(0.5, 2.95, speed=8.0, heading=-math.pi / 2), False),  # from a side road into its front flank
+        (car(0.5, 1.79, speed=10.0, heading=-0.3), False),  # cuts in
+        (car(4.1, 0.0, speed=6.0, heading=math.pi), True),  # head on: others keep to their lane
+        (car(1.0, 1.79, speed=6.0, heading=math.pi), True),  # along the flank of an oncoming one
+        (car(2.9, 1.2, speed=0.0, heading=math.pi / 2), True),  # which stands across its way
+    ],
+    ids=["side road", "cuts in", "head on", "oncoming flank", "across"],
+)
+def test_who_is_run_into_is_not_at_fault(obstacle: Obstacle, fault: bool) -> None:
+    _, (contact,) = resolve(ego(5.0), [obstacle])
+    assert contact.at_fault is fault
+
+
 def test_touching_something_that_draws_away_costs_nothing() -> None:
     after, (contact,) = resolve(ego(3.0), [car(4.1, 0.0, speed=9.0)])
     assert contact.impulse == 0.0

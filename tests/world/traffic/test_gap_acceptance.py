@@ -158,6 +158,8 @@ def test_nobody_is_bold_before_an_ego_that_turns() -> None:
         for bold in (True, False)
     )
     assert bold == careful
+    assert not may(car(5.5), 2.1 + 8.0, -2.06, 0.0, 0.2, bold=False)
+    assert may(car(5.5), 2.1 + 8.0, -2.06, 0.0, 0.2, bold=True)  # before one that drives straight on
 
 
 @pytest.mark.parametrize("curvature", [0.1, -0.1, 0.02])

@@ -63,7 +63,7 @@ def test_people_leave_neither_sidewalk_nor_road(busy: Walk, town02: RoadNetwork)
 def test_nobody_jumps(busy: Walk) -> None:
     steps = np.linalg.norm(np.diff(places(busy), axis=0), axis=2)
     assert steps.max() < 1.5, "the change to another loop may skip to the middle of the sidewalk"
-    assert (steps < 0.3).mean() > 0.99
+    assert (steps < 0.3).mean() > 0.98
 
 
 def test_people_walk_at_a_walking_pace_and_look_where_they_go(busy: Walk) -> None:
@@ -141,4 +141,4 @@ def test_nobody_is_run_over_on_a_street_where_a_fast_car_drives_up_and_down(town
         stepped = group.walkers.on_road & ~before & (np.abs(-s * d[:, 0] + c * d[:, 1]) < 2.0)
         ahead = (c * d[:, 0] + s * d[:, 1] - 2.1)[stepped]
         closest = min([closest, *ahead[ahead > 0]])
-    assert closest > 12.0
+    assert 12.0 < closest < 60.0  # somebody stepped out before it

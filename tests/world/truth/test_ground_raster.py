@@ -1,4 +1,4 @@
-"""What lies under the car: shares of its area on the opposite lane and on the sidewalk."""
+"""What lies under the car: shares of its area on the opposite lane and beside the road."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_the_share_over_the_centre_line_is_that_of_the_area(
     assert shares(raster, moved(here, left=left), here.heading) == pytest.approx((opposite, 0.0), abs=row)
 
 
-@pytest.mark.parametrize(("left", "share"), [(-1.0, 0.0), (-2.0, 0.5), (-3.5, 1.0), (-3.0 - SIDEWALK_WIDTH, 0.0)])
+@pytest.mark.parametrize(("left", "share"), [(-1.0, 0.0), (-2.0, 0.5), (-3.5, 1.0), (-3.0 - SIDEWALK_WIDTH, 1.0)])
 def test_the_share_beyond_the_kerb_is_that_of_the_area(
     left: float, share: float, raster: GroundRaster, street: Lane
 ) -> None:
@@ -86,17 +86,17 @@ def test_inside_a_junction_no_lane_is_the_opposite_one(raster: GroundRaster, tow
                 assert shares(raster, middle, middle.heading + turn)[0] == 0.0
 
 
-def test_far_from_the_town_there_is_neither(raster: GroundRaster) -> None:
-    assert shares(raster, Pose(-1e4, 1e4, 0.0), 0.0) == (0.0, 0.0)
+def test_far_from_the_town_there_is_no_road(raster: GroundRaster) -> None:
+    assert shares(raster, Pose(-1e4, 1e4, 0.0), 0.0) == (0.0, 1.0)
 
 
-def test_the_sidewalk_is_found_all_over_the_town(raster: GroundRaster, town02: RoadNetwork) -> None:
+def test_what_is_no_road_is_found_all_over_the_town(raster: GroundRaster, town02: RoadNetwork) -> None:
     rng = np.random.default_rng(0)
     x0, y0, x1, y1 = town02.bounds
     places = rng.uniform((x0 - 8, y0 - 8, -3), (x1 + 8, y1 + 8, 3), (400, 3)).tolist()
     poses = [Pose(x, y, heading) for x, y, heading in places]
     boxes = [shapely.Polygon(box_corners(pose, 4.2, 1.8)) for pose in poses]
-    true = [box.intersection(town02.sidewalk).area / box.area for box in boxes]
+    true = [box.difference(town02.roadway).area / box.area for box in boxes]
     measured = [shares(raster, pose, 0.0)[1] for pose in poses]
     assert max(true) > 0.9
     assert measured == pytest.approx(true, abs=0.15)

@@ -4,7 +4,7 @@ distance."""
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from caldrive.affordances import CONTINUOUS
 from caldrive.benchmark.artifacts import read_trace
 from caldrive.benchmark.published import SYSTEMS, success
-from caldrive.benchmark.report.runs import BenchmarkRun, cells_by_place
+from caldrive.benchmark.report.runs import BenchmarkRun, cells_by_place, suites
 from caldrive.datatypes import KMH
 from caldrive.results import Infraction, InfractionKind
 from caldrive.world.roads.towns import load_roads
@@ -44,7 +44,7 @@ def success_figure(runs: Sequence[BenchmarkRun]) -> str:
     figure = Figure(figsize=(12, 4.2), layout="constrained")
     ax = figure.subplots()
     by_place = cells_by_place(runs)
-    places = list(dict.fromkeys(key[1:] for key in by_place))
+    places = list(dict.fromkeys((condition, task) for _, condition, task in by_place))
     width = 0.8 / len(runs)
     for k, run in enumerate(runs):
         offset = (k - (len(runs) - 1) / 2) * width
@@ -56,28 +56,28 @@ def success_figure(runs: Sequence[BenchmarkRun]) -> str:
             [x for x, _ in bars], percents, width * 0.92, color=_run_color(k), label=run.name, yerr=error_bars,
             ecolor="#222222",
         )  # fmt: skip
-    _mark_published(ax, places)
+    _mark_published(ax, places, suites(runs))
     ax.set_xticks(range(len(places)), [f"{task}\n{condition}" for condition, task in places], fontsize=6, rotation=45)
     lowest = min((cell.interval[0] for cell in by_place.values()), default=0.0)
-    ax.set(ylabel="% reached in time", ylim=(lowest_percent(lowest, places), 101))
+    ax.set(ylabel="% reached in time", ylim=(lowest_percent(lowest, places, suites(runs)), 101))
     figure.legend(loc="outside right upper", fontsize=8)
     return svg(figure)
 
 
-def lowest_percent(lowest: float, places: Sequence[tuple[str, ...]]) -> float:
+def lowest_percent(lowest: float, places: Sequence[tuple[str, str]], of: Collection[str] = ()) -> float:
     """Where the axis begins: below all of ours and all of the paper's, at a whole ten, so that the bars' ends can be
     told apart."""
-    published = [success(system, *place) for place in places for system in SYSTEM_MARKERS]
+    published = [success(system, *place, of) for place in places for system in SYSTEM_MARKERS]
     return 10.0 * (min([lowest, *(percent for percent in published if percent is not None)]) // 10)
 
 
-def _mark_published(ax: Axes, places: Sequence[tuple[str, ...]]) -> None:
-    """What the paper's systems reached, at the cells' numbers."""
+def _mark_published(ax: Axes, places: Sequence[tuple[str, str]], of: Collection[str]) -> None:
+    """What the published systems reached in some suites, at the cells' numbers."""
     for system, marker in SYSTEM_MARKERS.items():
-        percents = ((i, success(system, *place)) for i, place in enumerate(places))
+        percents = ((i, success(system, *place, of)) for i, place in enumerate(places))
         points = [(i, percent) for i, percent in percents if percent is not None]
         if points:
-            label = f"{system} (paper)"
+            label = f"{system} (published)"
             ax.plot(*zip(*points, strict=True), marker, color="black", ms=6, mfc="white", label=label, ls="")
 
 

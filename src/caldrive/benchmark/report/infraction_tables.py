@@ -27,8 +27,9 @@ def infractions_table(runs: Sequence[BenchmarkRun]) -> Table:
                 published = [km_between(system, condition, kind) if tasks == DYNAMIC else "" for system in SYSTEMS]
                 rows.append((condition, tasks, kind.value, *_rate_texts(rates_of_kind), *published))
     text = (
-        "Kilometres between two infractions and how many there were, whoever's fault they were, as CARLA counts "
-        "them; > where there was none in so many kilometres; and how many were the agent's fault. The paper counts "
+        "Kilometres between two infractions and how many there were, whoever's fault they were, by the rules "
+        f"{' and '.join(sorted({result.episode.rules for run in runs for result in run.results}))} (docs/protocols); > "
+        "where there was none in so many kilometres; and how many were the agent's fault. The paper counts "
         "infractions in the task navigation-dynamic only."
     )
     head = ("condition", "tasks", "infraction", *_rate_heads(runs), *published_heads())
@@ -37,7 +38,7 @@ def infractions_table(runs: Sequence[BenchmarkRun]) -> Table:
 
 def touches_table(runs: Sequence[BenchmarkRun]) -> Table:
     """Kilometres between touches, of the runs that note them."""
-    runs = [run for run in runs if any(result.episode.touches for result in run.results)]
+    runs = [run for run in runs if run.notes_touches]
     rows = []
     for condition in conditions(runs):
         rates = [touch_rates(run.of_condition(condition)) for run in runs]
@@ -97,4 +98,4 @@ def red_lights_table(runs: Sequence[BenchmarkRun]) -> Table:
 
 def published_heads() -> tuple[str, ...]:
     """Of the columns beside ours."""
-    return tuple(f"{system} (paper)" for system in SYSTEMS)
+    return tuple(f"{system} (published)" for system in SYSTEMS)

@@ -75,6 +75,11 @@ class BenchmarkRun:
     explanations: Mapping[str, Explanation] = field(default_factory=dict)
     """Why episodes failed, by their keys, as far as it is known."""
 
+    @property
+    def notes_touches(self) -> bool:
+        """Whether its lines say what was touched: those of before behaviour had a version do not."""
+        return str(self.description["code"]).startswith("behaviour-")
+
     def of_condition(self, condition: str) -> list[TrialResult]:
         """The episodes of one condition."""
         return [result for result in self.results if result.trial.condition == condition]
@@ -188,6 +193,11 @@ def _unique_end(folder: Path, folders: Sequence[Path]) -> str:
     parts = folder.resolve().parts
     length = next(n for n in range(1, len(parts) + 1) if all(other[-n:] != parts[-n:] for other in others))
     return "/".join(parts[-length:])
+
+
+def suites(runs: Sequence[BenchmarkRun]) -> set[str]:
+    """That the runs are of."""
+    return {run.description["suite"] for run in runs}
 
 
 def conditions(runs: Sequence[BenchmarkRun]) -> list[str]:

@@ -23,7 +23,7 @@ from caldrive.datatypes import (
 )
 from caldrive.geometry import moved
 from caldrive.world.roads.network import LightPost, RoadNetwork
-from caldrive.world.traffic.collisions import at_fault
+from caldrive.world.traffic.collisions import Obstacle, at_fault
 
 THINNEST = 0.5  # m: some boxes of CARLA's bicycles have no width
 STATES = {"Red": LightState.RED, "Yellow": LightState.YELLOW}  # a light that is off stops nobody
@@ -106,10 +106,11 @@ class Actors:
         for hit in hits:
             other, impulse = hit.other_actor, hit.normal_impulse.length()
             kind = KINDS.get(other.type_id.partition(".")[0], ContactKind.OBJECT)
-            place = place_of(other.get_transform(), self._roads.offset)
             name = _name(other)
             if name not in found or impulse > found[name].impulse:
-                fault = at_fault(ego, np.array((place.x, place.y)), kind)
+                there = place_of(other.get_transform(), self._roads.offset).pose
+                speed = 0.0 if kind is ContactKind.OBJECT else forward_speed(other.get_velocity(), there.heading)
+                fault = at_fault(ego, Obstacle(kind, name, there, length=0.0, width=0.0, speed=speed))
                 found[name] = Contact(kind, name, impulse, at_fault=fault)
         return tuple(found.values())
 

@@ -62,8 +62,7 @@ class Connection:
         wanted, found = self.client.get_client_version(), self.client.get_server_version()
         if _release(wanted) != _release(found):
             raise RuntimeError(
-                f"found CARLA {found} at {self._address}, wanted {wanted}, which the client speaks: start that server, "
-                f"or type pip install carla=={found}"
+                f"found CARLA {found} at {self._address}, wanted {wanted}, the client's version: start CARLA {wanted}"
             )
 
     @contextmanager

@@ -36,7 +36,7 @@ class Sensor:
         blueprint = connection.blueprint(kind, **attributes)
         actor = connection.spawn(blueprint, place or connection.carla.Transform(), carrier)
         if actor is None:
-            raise RuntimeError(f"found that CARLA makes no {kind}, wanted one on the ego: start another server")
+            raise RuntimeError(f"found that CARLA makes no {kind}, wanted one on the ego: start CARLA 0.9.16")
         self.kind = kind
         self.latest: Any = None
         self._heard: SimpleQueue[Any] = SimpleQueue()

@@ -13,7 +13,7 @@ from caldrive.geometry import box_corners, push_out, to_local
 
 PERSON_MASS, CAR_MASS = 75.0, 1400.0  # kg
 TOUCH = 1e-6  # m: boxes that overlap by less, as after a push, have no contact
-STANDING = 0.3  # m/s below which the ego runs into nobody
+STANDING = 0.3  # m/s below which a car runs into nobody
 BUMPER = 0.8  # m from the front on which a person must be touched for it to be the ego's fault
 _MASSES = {ContactKind.PERSON: PERSON_MASS, ContactKind.CAR: CAR_MASS, ContactKind.OBJECT: math.inf}
 
@@ -49,15 +49,19 @@ def half_diagonal(box: VehicleState | Obstacle) -> float:
     return math.hypot(box.length, box.width) / 2
 
 
-def at_fault(ego: VehicleState, touch: Points, kind: ContactKind) -> bool:
-    """The ego is at fault where its moving front or flank runs into something, not where it is run into. touch: the
-    middle (2,) of what it touches."""
-    x = float(to_local(ego.pose, touch)[0])
-    if ego.speed < STANDING or x < 0:
-        return kind is ContactKind.OBJECT
-    if kind is ContactKind.PERSON:
-        return bool(x > ego.length / 2 - BUMPER)
-    return True
+def at_fault(ego: VehicleState, obstacle: Obstacle) -> bool:
+    """The ego is at fault where its moving front or flank runs into something, not where it is run into: from behind,
+    or by a car that comes towards its flank."""
+    ahead, left = to_local(ego.pose, np.array([obstacle.pose.x, obstacle.pose.y])).tolist()
+    if ego.speed < STANDING or ahead < 0:
+        return obstacle.kind is ContactKind.OBJECT
+    if obstacle.kind is ContactKind.PERSON:
+        return bool(ahead > ego.length / 2 - BUMPER)
+    corners = to_local(ego.pose, box_corners(obstacle.pose, obstacle.length, obstacle.width))
+    side = math.copysign(1.0, left)
+    into_front, into_flank = ego.length / 2 - corners[:, 0].min(), ego.width / 2 - (side * corners[:, 1]).min()
+    heading = obstacle.pose.heading - ego.pose.heading
+    return bool(into_front <= into_flank or -side * math.sin(heading) * obstacle.speed < STANDING)
 
 
 def _impulse(ego: VehicleState, obstacle: Obstacle, normal: Points) -> float:
@@ -90,8 +94,7 @@ def resolve(ego: VehicleState, obstacles: Sequence[Obstacle]) -> tuple[VehicleSt
             continue
         normal = shift / depth
         impulse = _impulse(ego, obstacle, normal)
-        touch = np.array([obstacle.pose.x, obstacle.pose.y])
-        contacts.append(Contact(obstacle.kind, obstacle.id, impulse, at_fault=at_fault(ego, touch, obstacle.kind)))
+        contacts.append(Contact(obstacle.kind, obstacle.id, impulse, at_fault=at_fault(ego, obstacle)))
         ego = _pushed(ego, obstacle, shift, impulse)
     return ego, tuple(contacts)
 

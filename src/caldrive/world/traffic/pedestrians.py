@@ -22,7 +22,7 @@ from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.traffic.gap_acceptance import Cars, bumps, is_clear, may_walk
 from caldrive.world.traffic.sidewalks import Crossing, Floats, Loops, find_sidewalks, require_room
 
-MEAN_WALK_BETWEEN_CROSSINGS = 20.0  # s
+MEAN_WALK_BETWEEN_CROSSINGS = 16.0  # s
 # Shares: of those who cross; of the bold, who run, and who come from behind something.
 BOLD, RUNNING, HIDDEN = 0.6, 0.3, 0.4
 SLOWEST_RUN, FASTEST_RUN = 2.2, 3.2  # m/s

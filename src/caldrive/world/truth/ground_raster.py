@@ -29,11 +29,11 @@ class _Tile(NamedTuple):
     """A square of the town, TILE cells wide."""
 
     lane: Integers  # the number of the lane, 0 for none
-    sidewalk: NDArray[np.bool_]
+    beside: NDArray[np.bool_]  # whether it is no road
 
 
 class GroundRaster:
-    """Sidewalks and the lanes outside junctions in cells of CELL metres, drawn tile by tile where somebody drives."""
+    """The road and the lanes outside junctions in cells of CELL metres, drawn tile by tile where somebody drives."""
 
     def __init__(self, roads: RoadNetwork) -> None:
         x0, y0, _, _ = roads.bounds
@@ -41,7 +41,7 @@ class GroundRaster:
         self.lines: list[Polyline] = [lane.line for lane in roads.driveable]
         self._straight = [_heading(line) for line in self.lines]
         self._lanes = STRtree([lane_area(lane.line, lane.width) for lane in roads.driveable])
-        self._sidewalks = STRtree(shapely.get_parts(roads.sidewalk))
+        self._road = STRtree(shapely.get_parts(roads.roadway))
         self._tiles: dict[tuple[int, int], _Tile] = {}
 
     def _tile(self, column: int, row: int) -> _Tile:
@@ -52,27 +52,27 @@ class GroundRaster:
             low = self.origin + TILE * CELL * np.array([column, row])
             area = shapely.box(*low, *(low + TILE * CELL))
             lanes = np.sort(self._lanes.query(area))
-            sidewalks = self._sidewalks.geometries[np.sort(self._sidewalks.query(area))]
+            road = self._road.geometries[np.sort(self._road.query(area))]
             self._tiles[column, row] = _Tile(
                 lane=_draw([(self._lanes.geometries[k], int(k) + 1) for k in lanes], low),
-                sidewalk=_draw([(polygon, 1) for polygon in sidewalks], low) == 1,
+                beside=_draw([(polygon, 1) for polygon in road], low) == 0,
             )
         return self._tiles[column, row]
 
     def shares(self, car: VehicleState, travel: float) -> tuple[float, float]:
-        """Shares in [0, 1] of the car's area on the opposite lane and on the sidewalk. travel: the route's heading
-        there, rad."""
+        """Shares in [0, 1] of the car's area on the opposite lane, and beside the road: on the sidewalk, or beyond it.
+        travel: where it should drive to there, rad."""
         pose, grid, (x0, y0) = car.pose, _spread(car.length, car.width), self.origin.tolist()
         frame = pose.x - x0, pose.y - y0, math.cos(pose.heading), math.sin(pose.heading)
-        under, sidewalk, reach = np.zeros(len(grid), np.int32), 0, math.hypot(car.length, car.width) / 2
+        under, beside, reach = np.zeros(len(grid), np.int32), 0, math.hypot(car.length, car.width) / 2
         columns, rows = ({math.floor((at + side) / (CELL * TILE)) for side in (-reach, reach)} for at in frame[:2])
         for column in columns:
             for row in rows:
                 tile = self._tile(column, row)
-                sidewalk += _look_under(grid, frame, tile, (column * TILE, row * TILE), under)
+                beside += _look_under(grid, frame, tile, (column * TILE, row * TILE), under)
         lanes = under.tolist()
         opposite = sum(lanes.count(number) for number in set(lanes) if number and self._opposes(number, pose, travel))
-        return opposite / len(lanes), sidewalk / len(lanes)
+        return opposite / len(lanes), beside / len(lanes)
 
     def _opposes(self, number: int, pose: Pose, travel: float) -> bool:
         """Whether traffic on a lane runs against a direction of travel (rad)."""
@@ -86,17 +86,17 @@ class GroundRaster:
 def _look_under(
     grid: Points, frame: tuple[float, float, float, float], tile: _Tile, low: tuple[int, int], lanes: Integers
 ) -> int:
-    """Writes the lanes under those points (N, 2) of a car that lie in a tile; returns how many lie on sidewalks. frame:
-    x, y of the car from the origin, cosine and sine of its heading; low: the tile's first column and row."""
-    sidewalk, size = 0, len(tile.lane)
+    """Writes the lanes under those points (N, 2) of a car that lie in a tile; returns how many lie beside the road.
+    frame: x, y of the car from the origin, cosine and sine of its heading; low: the tile's first column and row."""
+    beside, size = 0, len(tile.lane)
     for k in range(len(grid)):
         x = frame[0] + frame[2] * grid[k, 0] - frame[3] * grid[k, 1]
         y = frame[1] + frame[3] * grid[k, 0] + frame[2] * grid[k, 1]
         column, row = math.floor(x / CELL) - low[0], math.floor(y / CELL) - low[1]
         if 0 <= column < size and 0 <= row < size:
             lanes[k] = tile.lane[row, column]
-            sidewalk += tile.sidewalk[row, column]
-    return sidewalk
+            beside += tile.beside[row, column]
+    return beside
 
 
 def _draw(polygons: list[tuple[shapely.Polygon, int]], low: Points) -> NDArray[np.int32]:

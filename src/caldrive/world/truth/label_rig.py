@@ -21,7 +21,7 @@ from caldrive.datatypes import (
     Truth,
     VehicleState,
 )
-from caldrive.geometry import moved, positions
+from caldrive.geometry import moved, positions, wrap_angle
 from caldrive.scenarios import Scenario
 from caldrive.world.roads.levels import RouteLevel
 from caldrive.world.roads.route import Route
@@ -30,6 +30,7 @@ from caldrive.world.truth.labels import label
 from caldrive.world.truth.other_commands import Fork, alternatives, forks
 
 IN_REACH = 25.0  # m within which signs and lights count
+OFF_ROUTE = math.radians(60.0)  # from which on a car drives another way than its route: its own says what is opposite
 MARGIN = 15.0  # m that a car may drive until they are looked for again
 
 
@@ -111,6 +112,8 @@ class LabelRig:
         """All that is true of a state of the world."""
         ego, goal = state.ego, self.scenario.goal
         travel = self.route.line.heading_at(state.progress)
+        if abs(wrap_angle(ego.pose.heading - travel)) > OFF_ROUTE:
+            travel = ego.pose.heading
         opposite, sidewalk = self.town.ground.shares(ego, travel)
         return Truth(
             time=state.time,
