@@ -101,8 +101,9 @@ def test_the_hardest_hit_counts_and_whose_fault_it_is() -> None:
     ego = VehicleState(Pose(0.0, 0.0, 0.0), speed=5.0)
     ahead = actor(3, Pose(4.5, 0.0, 0.0), 0.0, (4.5, 1.8), "vehicle.audi.tt")
     beside = actor(4, Pose(0.0, 1.2, 0.0), 1.0, (0.5, 0.5), "walker.pedestrian.0001")
+    kerb = actor(0, Pose(2.0, 0.0, 0.0), 0.0, (0.2, 0.2), "static.sidewalk")
     pole = actor(0, Pose(0.0, 0.0, 0.0), 0.0, (0.2, 0.2), "static.pole")
-    hits = [(ahead, 100.0), (ahead, 4000.0), (ahead, 20.0), (beside, 50.0), (pole, 10.0)]
+    hits = [(ahead, 100.0), (ahead, 4000.0), (ahead, 20.0), (beside, 50.0), (kerb, 900.0), (pole, 10.0)]
     events = [SimpleNamespace(other_actor=other, normal_impulse=vector(-n, 0.0)) for other, n in hits]
     car, person, thing = Actors(Server(), load_roads("town01"), ego=1).contacts(events, ego)  # type: ignore[arg-type]
     assert (car.kind, car.impulse, car.at_fault) == (ContactKind.CAR, 4000.0, True)

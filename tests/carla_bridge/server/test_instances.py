@@ -44,6 +44,19 @@ def test_an_instance_picture_tells_the_car_from_the_wall() -> None:
     assert np.abs(seen[..., 1][numbers == 1]).max() < 1.5
 
 
+def test_a_semantic_lidar_may_have_no_ray_in_a_step_and_see_nothing_far_off() -> None:
+    slow = lidar_settings(asked(channels="32", points_per_second="10"))
+    found = semantic_scan(slow, Placement(z=1.0), 0.0, rays()._replace(views=with_cosines(pictures)), [CAR])
+    assert len(found.points) == 0 == found.counts.sum()
+
+    def empty(camera: PinholeCamera) -> tuple[Array, Classes]:
+        distances, classes = pictures(camera)
+        return np.where(classes == Semantic.SKY, np.inf, distances), classes
+
+    cosines = with_cosines(empty)(PinholeCamera(Pose(0.0, 0.0, 0.0), height=1.0, pitch=0.0, fov=90.0, size=(40, 30)))
+    assert np.isfinite(cosines).all()
+
+
 @pytest.mark.parametrize("heading", [0.0, 0.6])
 def test_a_semantic_lidar_tells_class_body_and_angle_of_each_point(heading: float) -> None:
     lidar = lidar_settings(asked(channels="5", upper_fov="4", lower_fov="-16", points_per_second="20000", range="30"))

@@ -88,6 +88,13 @@ def test_points_are_lost_by_chance_and_where_it_is_dark(general: str, dark: str,
     assert found.counts[0] / 4000 == pytest.approx(kept, abs=0.03)
 
 
+def test_without_a_limit_of_intensity_no_point_is_lost_in_the_dark() -> None:
+    lidar = lidar_settings(
+        asked(channels="1", upper_fov="-30", dropoff_general_rate="0", dropoff_intensity_limit="0.0")
+    )
+    assert scan(lidar, Placement(z=2.0), 0.0, rays()).counts.sum() == 5600
+
+
 def test_noise_moves_points_along_their_rays() -> None:
     usual = {"channels": "1", "upper_fov": "-30", "dropoff_general_rate": "0", "dropoff_zero_intensity": "0"}
     exact, noisy = (

@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterator
 
 import msgpack
+import numpy as np
 import pytest
 
 from caldrive.carla_bridge.axes import compose
@@ -155,6 +156,15 @@ def test_a_light_shows_what_a_client_wants_until_its_time_is_over(server: Server
     assert light.held is None
 
 
+def test_a_light_that_is_given_a_time_after_its_state_keeps_it_for_so_long(server: Server, client: WireClient) -> None:
+    light = server.episode.lights.actors[0]
+    client.call("set_traffic_light_state", light.id, 2)
+    client.call("set_traffic_light_green_time", light.id, 30.0)
+    for _ in range(200):
+        client.call("tick_cue")
+    assert light.state is LightState.GREEN
+
+
 def test_a_light_that_is_switched_off_leaves_the_others_of_its_junction_alone(
     server: Server, client: WireClient
 ) -> None:
@@ -206,7 +216,7 @@ def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient)
     assert seen[0] != seen[-1]
 
 
-@pytest.mark.parametrize("fixed_delta", [[], [True], [True, 2.0], [True, -0.1], [2, -5.0], [True, float("nan")]])
+@pytest.mark.parametrize("fixed_delta", [[], [True], [True, 20.0], [True, -0.1], [2, -5.0], [True, float("nan")]])
 def test_settings_that_cannot_be_are_refused(client: WireClient, fixed_delta: list[object]) -> None:
     with pytest.raises(RefusedError, match="fixed_delta"):
         client.call("set_episode_settings", [True, False, fixed_delta])
@@ -317,3 +327,47 @@ def test_a_vehicle_that_hits_a_standing_one_says_so(client: WireClient) -> None:
     own, other, impulse = msgpack.unpackb(reader.message()[48:])
     assert (own[0], other[2][1]) == (car, "vehicle.carlamotors.firetruck")
     assert sum(part**2 for part in impulse) > 1000.0**2
+
+
+def test_who_is_spawned_before_the_first_step_is_in_the_next_frame(server: Server) -> None:
+    free = WireClient(server)
+    reader = Reader(free, WORLD)
+    frame, time = struct.unpack_from("<8xQd", reader.message())
+    car = free.spawn("vehicle.tesla.model3", place(free, 0))
+    snapshot = reader.message()
+    assert struct.unpack_from("<8xQd", snapshot) == (frame + 1, time)
+    assert positions(snapshot)[car] == pytest.approx(place(free, 0)[:2])
+    free.leave()
+
+
+def test_what_is_put_aside_far_below_the_ground_meets_nobody(server: Server, client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+    client.spawn("vehicle.tesla.model3", (x, y, yaw))
+    aside = [[x, y, -500.0], [0.0, yaw, 0.0]]
+    parked, *_ = client.call("spawn_actor", [1, "vehicle.audi.tt", []], aside)
+    client.call("set_actor_simulate_physics", parked, False)
+    prop, *_ = client.call("spawn_actor", [1, "static.prop.container", []], aside)
+    client.call("tick_cue")
+    assert not server.episode.hits
+    assert len(server.episode.bodies()) == 1
+    assert parked != prop
+
+
+def test_a_sensor_that_speaks_now_and_then_keeps_its_distance(server: Server, client: WireClient) -> None:
+    for _ in range(3):
+        client.call("tick_cue")
+    gnss = client.spawn("sensor.other.gnss", place(client, 0), sensor_tick="0.5")
+    token = server.episode.get(gnss)
+    assert token is not None
+    reader, spoken = Reader(client, token.stream), []
+    for _ in range(14):
+        client.call("tick_cue")
+    for _ in range(3):
+        spoken.append(struct.unpack_from("<16xd", reader.message())[0])
+    assert np.diff(spoken) == pytest.approx([0.5, 0.5])
+
+
+def test_a_refused_batch_has_the_form_of_a_list(client: WireClient) -> None:
+    (((flag, (text,)),),) = client.call("apply_batch", [[[1, [1]]]] * 10_001, False)
+    assert flag == 0
+    assert "found" in text

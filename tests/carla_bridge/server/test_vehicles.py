@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import pytest
 
+from caldrive.carla_bridge.axes import Placement
+from caldrive.carla_bridge.server.actors import description
 from caldrive.carla_bridge.server.layouts import AckermannControl, VehicleControl
-from caldrive.carla_bridge.server.vehicles import by_ackermann, drive
+from caldrive.carla_bridge.server.vehicles import Vehicle, by_ackermann, drive, physics_of, set_physics
 from caldrive.datatypes import Pose
 from caldrive.world.traffic.ego import EgoState, VehicleConfig
 
@@ -55,6 +58,30 @@ def test_the_reverse_gear_brakes_what_drives_ahead() -> None:
 
 def test_the_hand_brake_holds() -> None:
     assert driven(VehicleControl(throttle=1.0, hand_brake=True), 1.0).speed < 0.1
+
+
+def vehicle(**attributes: str) -> Vehicle:
+    about = description("vehicle.audi.tt", **attributes)
+    return Vehicle(1, about, Placement(), state=EgoState(Pose(0.0, 0.0, 0.0)))
+
+
+def test_what_is_set_of_wheels_is_read_back_and_their_places_are_where_they_are() -> None:
+    car = vehicle()
+    wheels = tuple(msgspec.structs.replace(wheel, tire_friction=5.0) for wheel in physics_of(car).wheels)
+    set_physics(car, msgspec.structs.replace(physics_of(car), wheels=wheels))
+    car.put(Placement(x=10.0))
+    found = physics_of(car).wheels
+    assert [wheel.tire_friction for wheel in found] == [5.0] * 4
+    assert found[0].position.x > 1000.0
+
+
+@pytest.mark.parametrize(("sticky", "throttle"), [("true", 1.0), ("False", 0.0)])
+def test_a_control_holds_until_the_next_one_or_for_a_step(sticky: str, throttle: float) -> None:
+    car = vehicle(sticky_control=sticky)
+    car.control = VehicleControl(throttle=1.0)
+    car.step(0.1)
+    assert car.state.speed > 0.0
+    assert car.control.throttle == throttle
 
 
 @pytest.mark.parametrize("speed", [3.0, 8.0, -2.0])

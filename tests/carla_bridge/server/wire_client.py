@@ -3,10 +3,12 @@ answered."""
 
 from __future__ import annotations
 
+import os
 import socket
 import struct
 import time
 from contextlib import suppress
+from random import Random
 from typing import Any
 
 import msgpack
@@ -14,6 +16,7 @@ import msgpack
 from caldrive.carla_bridge.server.server import Server
 
 PATIENCE = 20.0  # s
+PORTS = Random(os.getpid())
 
 
 class RefusedError(Exception):
@@ -119,10 +122,11 @@ def positions(snapshot: bytes) -> dict[int, tuple[float, float]]:
 
 
 def free_port() -> int:
-    """The first of three ports in a row that nobody has: each process of a test run serves by its own."""
+    """The first of three ports in a row that nobody has: each process of a test run serves by its own. They are not
+    among those that a system gives to whoever connects."""
     while True:
-        with socket.create_server(("127.0.0.1", 0)) as first, suppress(OSError, OverflowError):
-            port: int = first.getsockname()[1]
-            for k in (1, 2):
+        port = PORTS.randrange(10_000, 30_000)
+        with suppress(OSError):
+            for k in range(3):
                 socket.create_server(("127.0.0.1", port + k)).close()
             return port

@@ -29,6 +29,7 @@ THINNEST = 0.5  # m: some boxes of CARLA's bicycles have no width
 STATES = {"Red": LightState.RED, "Yellow": LightState.YELLOW}  # a light that is off stops nobody
 STOP_REACH, SAME_WAY = 8.0, 0.7  # m from a light's stop line to our post's, and cosine between their traffic
 KINDS = {"vehicle": ContactKind.CAR, "walker": ContactKind.PERSON}
+GROUND = tuple(f"static.{kind}" for kind in ("road", "roadline", "sidewalk", "ground", "terrain"))  # kerbs are no hits
 Offset = tuple[float, float]
 
 
@@ -105,6 +106,8 @@ class Actors:
         found: dict[str, Contact] = {}
         for hit in hits:
             other, impulse = hit.other_actor, hit.normal_impulse.length()
+            if other.type_id in GROUND:
+                continue
             kind = KINDS.get(other.type_id.partition(".")[0], ContactKind.OBJECT)
             name = _name(other)
             if name not in found or impulse > found[name].impulse:

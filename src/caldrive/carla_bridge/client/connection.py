@@ -141,6 +141,7 @@ class Connection:
         with self.answers():
             self._before, settings = self.world.get_settings(), self.world.get_settings()
             settings.synchronous_mode, settings.fixed_delta_seconds = True, DT
+            settings.no_rendering_mode = False  # else cameras say nothing
             settings.max_substeps, settings.max_substep_delta_time = SUBSTEPS, DT / SUBSTEPS
             self.world.apply_settings(settings)
             self.tick()  # before it a server that a killed process left waiting shows nobody
@@ -215,12 +216,14 @@ class Connection:
 
     def close(self) -> None:
         """Removes all that was spawned and puts the settings back, if the server still hears it."""
-        if self.is_alive():
+        works = [self.clear, self._end_manager, self._put_back] if self.is_alive() else [self._end_manager]
+        for work in works:
             with suppress(RuntimeError):  # it has gone meanwhile, and all with it
-                self.clear()
-                self._end_manager()
-                if self._before is not None:
-                    self.world.apply_settings(self._before)
+                work()
+
+    def _put_back(self) -> None:
+        if self._before is not None:
+            self.world.apply_settings(self._before)
 
 
 def served_town(host: str, port: int, town: str) -> str:

@@ -61,6 +61,8 @@ class CarlaWorld(EpisodeWorld[Episode]):
             with connection.answers():
                 connection.clear()
         else:
+            if connection is not None:
+                connection.close()  # its traffic manager would go on, and end this process
             connection = Connection(self._host, self._port)
         self._connection = connection
         connection.synchronise()

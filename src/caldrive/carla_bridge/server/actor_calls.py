@@ -10,7 +10,7 @@ from caldrive.carla_bridge.axes import Placement, compose
 from caldrive.carla_bridge.server.actors import Actor, ActorLayout, Prop, box_of
 from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, REFUSED, SIZES
 from caldrive.carla_bridge.server.calls import call
-from caldrive.carla_bridge.server.episode import PERSON_BOX
+from caldrive.carla_bridge.server.episode import PERSON_BOX, is_on_ground
 from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox, Transform, Vector, placement
 from caldrive.carla_bridge.server.sensor_actors import SensorActor, checked
 from caldrive.carla_bridge.server.server import Server
@@ -114,7 +114,7 @@ class ActorCalls:
         return Prop(0, asked, at, box=box_of((length, width, height), height / 2))
 
     def _require_room(self, at: Placement, length: float, width: float) -> None:
-        if not self._server.episode.has_room(VehicleState(at.pose, length=length, width=width)):
+        if is_on_ground(at) and not self._server.episode.has_room(VehicleState(at.pose, length=length, width=width)):
             raise Refusal(OCCUPIED)
 
     @call("destroy_actor")

@@ -169,7 +169,11 @@ _SENSORS: dict[str, dict[str, str]] = {
 
 
 def _sensor(id: str) -> list[Attribute]:
-    attributes = [*_names("front"), _free("sensor_tick", FLOAT, "0.0"), *_floats(_SENSORS[id])]
+    attributes = [*_names("front"), *_floats(_SENSORS[id])]
+    if id not in ("sensor.other.collision", "sensor.other.lane_invasion", "sensor.other.rss"):
+        attributes.append(_free("sensor_tick", FLOAT, "0.0"))
+    if id in ("sensor.other.radar", "sensor.lidar.ray_cast", "sensor.other.gnss", "sensor.other.imu"):
+        attributes.append(_free("noise_seed", INT, "0"))
     if id.startswith("sensor.lidar."):
         attributes += [_free("channels", INT, "32"), _free("points_per_second", INT, "56000")]
     if id == "sensor.other.radar":
@@ -192,6 +196,11 @@ def _all() -> dict[str, list[Attribute]]:
     found |= {id: _sensor(id) for id in _SENSORS}
     found |= {id: _names("prop") for id, *_ in PROPS}
     return found
+
+
+def usual_attributes(id: str) -> dict[str, str]:
+    """Of an actor that is made without a wish, by name."""
+    return {name: value for name, _, value, *_ in BLUEPRINTS[id].attributes}
 
 
 BLUEPRINTS = {id: Blueprint(uid, id, tuple(rows)) for uid, (id, rows) in enumerate(_all().items(), 1)}

@@ -72,8 +72,13 @@ def serve(calls: Mapping[str, Call], caller: int, request: Request) -> Any:
     try:
         result = found.serve(caller, *_arguments(found, request))
     except Refusal as refusal:
-        return refused(str(refusal), found.is_void)
+        return turned_down(str(refusal), found)
     return result if found.is_bare else served(result, found.is_void)
+
+
+def turned_down(text: str, found: Call) -> Any:
+    """What a client raises as RuntimeError with a text; who asks for a list of results finds it as the only one."""
+    return [refused(text, False)] if found.is_bare else refused(text, found.is_void)
 
 
 def _arguments(found: Call, request: Request) -> tuple[Any, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import selectors
 import socket
+import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,6 +26,8 @@ class Client:
     socket: socket.socket
     outbox: Outbox
     requests: Requests = field(default_factory=Requests)
+    asked: deque[Request] = field(default_factory=deque)
+    """What it waits for an answer to."""
 
 
 class Clients:
@@ -34,7 +38,7 @@ class Clients:
     ) -> None:
         self._waiting, self._log, self._serve, self._gone = waiting, log, serve, gone
         self.port = int(waiting.getsockname()[1])
-        self._clients: set[Client] = set()
+        self._clients: dict[int, Client] = {}
         self._next = 1
         self._selector = selectors.DefaultSelector()
         self._selector.register(waiting, selectors.EVENT_READ)
@@ -48,7 +52,7 @@ class Clients:
         return self._selector.fileno()
 
     def poll(self) -> None:
-        """Lets in who comes, answers what they ask, and sends on what waits."""
+        """Lets in who comes, hears what they ask, and sends on what waits."""
         for key, events in self._selector.select(0):
             if key.data is None:
                 self._let_in()
@@ -63,7 +67,7 @@ class Clients:
                 continue
             client = Client(self._next, connection, Outbox(connection))
             self._next += 1
-            self._clients.add(client)
+            self._clients[client.number] = client
             self._selector.register(connection, selectors.EVENT_READ, client)
 
     def _attend(self, client: Client, events: int) -> None:
@@ -73,13 +77,11 @@ class Clients:
                 client.outbox.flush()
             if events & selectors.EVENT_READ:
                 self._hear(client)
-            writes = selectors.EVENT_WRITE if client.outbox.waiting else 0
-            self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
+            self._watch(client)
         except Gone:
             self._let_go(client)
         except BrokenMessage as error:
-            self._log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
-            self._let_go(client)
+            self._cut_off(client, error)
 
     def _hear(self, client: Client) -> None:
         try:
@@ -90,20 +92,52 @@ class Clients:
             raise Gone from error
         if not received:
             raise Gone
-        for request in client.requests.feed(received):
+        client.asked += client.requests.feed(received)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether anybody waits for an answer."""
+        return any(client.asked for client in self._clients.values())
+
+    def serve_some(self, seconds: float) -> None:
+        """Answers what is asked, one call of each client in turn, for so long at most."""
+        until = time.monotonic() + seconds
+        while self.is_busy and time.monotonic() < until:
+            for client in [one for one in self._clients.values() if one.asked]:
+                self._answer(client)
+
+    def _answer(self, client: Client) -> None:
+        """Answers a client's next call."""
+        request = client.asked.popleft()
+        try:
             client.outbox.put([answer(request.id, self._serve(client.number, request))])
             if client.outbox.waiting > MOST_UNREAD:
                 raise BrokenMessage("it does not read its answers")
+            self._watch(client)
+        except Gone:
+            self._let_go(client)
+        except BrokenMessage as error:
+            self._cut_off(client, error)
+
+    def _watch(self, client: Client) -> None:
+        """Waits for room in a socket as long as something has to be sent."""
+        writes = selectors.EVENT_WRITE if client.outbox.waiting else 0
+        if self._selector.get_key(client.socket).events != selectors.EVENT_READ | writes:
+            self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
+
+    def _cut_off(self, client: Client, error: BrokenMessage) -> None:
+        self._log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
+        self._let_go(client)
 
     def _let_go(self, client: Client) -> None:
         self._selector.unregister(client.socket)
         client.socket.close()
-        self._clients.discard(client)
+        del self._clients[client.number]
         self._gone(client.number)
 
     def close(self) -> None:
         """Ends all of them."""
-        for client in self._clients:
+        for client in self._clients.values():
             client.socket.close()
         self._selector.close()
         self._waiting.close()

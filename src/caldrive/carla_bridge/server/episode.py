@@ -11,7 +11,7 @@ import shapely
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server import snapshot
 from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description
-from caldrive.carla_bridge.server.blueprints import N_WALKERS
+from caldrive.carla_bridge.server.blueprints import N_WALKERS, usual_attributes
 from caldrive.carla_bridge.server.contacts import Hit, is_free, resolve_contacts
 from caldrive.carla_bridge.server.layouts import BoundingBox, Vector, VehicleControl
 from caldrive.carla_bridge.server.layouts import Weather as CarlaWeather
@@ -32,6 +32,7 @@ from caldrive.world.town import Town
 LOOK_AT_LIMITS = 10  # steps from one look at the limit under a vehicle to the next
 NATIVE_CARS = {4.2: "vehicle.seat.leon", 4.6: "vehicle.tesla.model3", 4.9: "vehicle.volkswagen.t2"}  # by their length
 NATIVE_HEIGHT = 1.5  # m
+OFF_GROUND = 5.0  # m above or below the ground, from which on nothing is met
 PERSON_BOX = BoundingBox(Vector(), Vector(RADIUS, RADIUS, HEIGHT / 2))
 Kind = TypeVar("Kind", bound=Actor)
 
@@ -45,6 +46,8 @@ class Episode:
     ) -> None:
         self.number, self.town, self.time, self.delta = number, town, 0.0, 0.0
         self.hits: list[Hit] = []
+        self.has_changed = False
+        """Whether actors came or went since the last snapshot."""
         self._steps, self._numbers = 0, numbers
         self.set_weather(as_carla(weather(settings.weather)))
         self._population = Population(town.roads, settings.cars, settings.people, settings.seed)
@@ -75,7 +78,7 @@ class Episode:
 
     def add(self, actor: Actor) -> None:
         """A client's actor is there from now on."""
-        self._actors[actor.id] = actor
+        self._actors[actor.id], self.has_changed = actor, True
         if actor.parent is not None:
             actor.parent.children.append(actor)
 
@@ -87,11 +90,12 @@ class Episode:
         if actor.parent is not None and actor in actor.parent.children:
             actor.parent.children.remove(actor)
         self._actors.pop(actor.id, None)
+        self.has_changed = True
         return gone
 
     def has_room(self, box: VehicleState) -> bool:
         """Whether a new body fits there."""
-        return is_free(box, self.bodies(), self.all(Prop), self.town.obstacles)
+        return is_free(box, self.bodies(), self._props(), self.town.obstacles)
 
     def actor_of(self, name: str) -> Actor | None:
         """The actor behind the id of a car or a person, None for what stands in the town."""
@@ -109,9 +113,10 @@ class Episode:
             vehicle.step(delta)
         for walker in walkers:
             walker.step(delta)
-        self._population.move_to(self.time, [one.box_state() for one in vehicles], self._walker_states())
+        self._population.move_to(self.time, self._vehicle_states(), self._walker_states())
         self._take_down()
-        self.hits = resolve_contacts(vehicles, self.bodies(), self.all(Prop), self.town.obstacles)
+        there = [one for one in vehicles if is_on_ground(one.place)]
+        self.hits = resolve_contacts(there, self.bodies(), self._props(), self.town.obstacles)
         for vehicle, state in zip(vehicles, before, strict=True):
             vehicle.note_motion(state, delta)
         if self._steps % LOOK_AT_LIMITS == 1:
@@ -144,7 +149,12 @@ class Episode:
             box = PERSON_BOX
             if isinstance(body, VehicleState):
                 box = box_of((body.length, body.width, NATIVE_HEIGHT), NATIVE_HEIGHT / 2)
-            actor = Actor(next(self._numbers), description(kind, role_name="autopilot"), Placement(), box=box)
+            actor = Actor(
+                next(self._numbers),
+                description(kind, **usual_attributes(kind) | {"role_name": "autopilot"}),
+                Placement(),
+                box=box,
+            )
             self._natives[body.id] = self._actors[actor.id] = actor
         actor = self._natives[body.id]
         c, s = math.cos(body.pose.heading), math.sin(body.pose.heading)
@@ -155,22 +165,34 @@ class Episode:
         return [
             one.state(bool(shapely.contains_xy(self.town.roads.roadway, one.own_place.x, one.own_place.y)))
             for one in self.all(Walker)
+            if is_on_ground(one.own_place)
         ]
+
+    def _vehicle_states(self, but: int = 0) -> list[VehicleState]:
+        return [one.box_state() for one in self.all(Vehicle) if one.id != but and is_on_ground(one.place)]
+
+    def _props(self) -> list[Prop]:
+        return [one for one in self.all(Prop) if is_on_ground(one.place)]
 
     def bodies(self) -> list[VehicleState | PedestrianState]:
         """Everybody who moves."""
-        return [*self.cars, *self.people, *(one.box_state() for one in self.all(Vehicle)), *self._walker_states()]
+        return [*self.cars, *self.people, *self._vehicle_states(), *self._walker_states()]
 
     def scene(self, camera: Placement, carrier: Actor | None) -> SceneState:
         """What a camera may see; not the vehicle that carries it, where the camera is inside its box."""
         own = carrier.id if isinstance(carrier, Vehicle) and _is_inside(carrier, camera) else 0
-        vehicles = [one.box_state() for one in self.all(Vehicle) if one.id != own]
-        here = VehicleState(camera.pose)
+        here, vehicles = VehicleState(camera.pose), [*self.cars, *self._vehicle_states(but=own)]
         lights = {one.post.id: one.state for one in self.lights.actors}
         people = [*self.people, *self._walker_states()]
-        return SceneState(self.drawn_weather, here, [*self.cars, *vehicles], people, lights, self.time)
+        return SceneState(self.drawn_weather, here, vehicles, people, lights, self.time)
 
-    def rows(self) -> list[bytes]:
+    def snapshot(self, frame: int) -> bytes:
+        """Who is where now, as it goes to clients."""
+        self.has_changed = False
+        place = snapshot.header(snapshot.Sensor.WORLD, frame, self.time)
+        return b"".join((place, snapshot.world_head(self.number, self.time, self.delta), *self._rows()))
+
+    def _rows(self) -> list[bytes]:
         """All actors, as a snapshot has them."""
         absent = self._natives.keys() - {one.id for one in self.cars} - {one.id for one in self.people}
         missing = {self._natives[name].id for name in absent}
@@ -196,6 +218,11 @@ class Episode:
     def close(self) -> None:
         """Ends the traffic."""
         self._population.close()
+
+
+def is_on_ground(place: Placement) -> bool:
+    """Whether something meets what is in the town: programs put aside far below or above it what they need later."""
+    return abs(place.z) < OFF_GROUND
 
 
 def _is_inside(vehicle: Vehicle, camera: Placement) -> bool:

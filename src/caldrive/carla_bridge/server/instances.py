@@ -15,6 +15,7 @@ from caldrive.datatypes import PedestrianState, Semantic, VehicleState
 from caldrive.world.rendering.pinhole import PinholeCamera
 
 NEAR = 0.2  # m around a body within which a point is on it
+FARTHEST = 1e4  # m
 LOW = 0.1  # m above the ground: what lies lower is the ground
 MOVING = (Semantic.VEHICLE, Semantic.PERSON)
 Body = VehicleState | PedestrianState
@@ -70,6 +71,15 @@ def semantic_scan(
 ) -> SemanticScan:
     """What a lidar finds while it turns on; no point is lost. The views of `rays` also hold classes and cosines."""
     azimuths, elevations, count = directions(lidar, angle, rays.delta)
+    if not count:
+        nothing = np.zeros(0)
+        return SemanticScan(
+            np.zeros(len(lidar.elevations), int),
+            np.zeros((0, 3)),
+            nothing,
+            nothing.astype(np.uint8),
+            nothing.astype(int),
+        )
     found = cast(place, azimuths, elevations, rays.views)
     keep = np.linalg.norm(found[:, :3], axis=1) < lidar.range
     points, classes = found[keep, :3], found[keep, 3].astype(np.uint8)
@@ -85,6 +95,7 @@ def with_cosines(pictures: Pictures) -> Callable[[PinholeCamera], Array]:
 
     def views(camera: PinholeCamera) -> Array:
         distances, classes = pictures(camera)
+        distances = np.minimum(distances, FARTHEST)  # where nothing is drawn they are infinite
         seen = places(camera, distances)
         down, right = np.gradient(seen, axis=0), np.gradient(seen, axis=1)
         normal, ray = np.cross(down, right), seen - camera.view().position

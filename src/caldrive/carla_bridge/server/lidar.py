@@ -78,7 +78,7 @@ def lidar_settings(asked: ActorDescription) -> LidarSettings:
         range=asked.number("range", 10.0, 0.1, 1000.0),
         attenuation=asked.number("atmosphere_attenuation_rate", 0.004, 0.0, 100.0),
         lost=asked.number("dropoff_general_rate", 0.45, 0.0, 1.0),
-        bright=asked.number("dropoff_intensity_limit", 0.8, 0.001, 1.0),
+        bright=asked.number("dropoff_intensity_limit", 0.8, 0.0, 1.0),
         lost_dark=asked.number("dropoff_zero_intensity", 0.4, 0.0, 1.0),
         noise=asked.number("noise_stddev", 0.0, 0.0, 100.0),
     )  # fmt: skip
@@ -108,7 +108,7 @@ def scan(lidar: LidarSettings, place: Placement, angle: float, rays: Rays) -> Li
     distances = np.linalg.norm(ends, axis=1)
     intensity = np.exp(-lidar.attenuation * distances)
     keep = (distances < lidar.range) & (rays.rng.random(len(ends)) >= lidar.lost)
-    dark = lidar.lost_dark * (1.0 - intensity / lidar.bright)  # at or below 0 where it is bright
+    dark = lidar.lost_dark * (1.0 - intensity / max(lidar.bright, 1e-9))  # at or below 0 where it is bright
     keep &= rays.rng.random(len(ends)) >= dark
     noise = rays.rng.normal(0.0, lidar.noise, len(ends)) / np.maximum(distances, NEAREST)
     points = np.column_stack((ends * (1.0 + noise[:, None]), intensity))[keep]

@@ -38,7 +38,14 @@ class Light(Actor):
     since: float = 0.0
     """s: when it began to show this."""
     held: tuple[LightState, float] | None = None
-    """What a client wants it to show, and until when (s)."""
+    """What a client wants it to show, and since when (s)."""
+
+    @property
+    def holds_until(self) -> float:
+        """s: what a client wants lasts as long as the light's time for it, which may be set later."""
+        assert self.held is not None
+        state, since = self.held
+        return since + self.times[(LightState.GREEN, LightState.YELLOW, LightState.RED).index(state)]
 
 
 def light_actors(roads: RoadNetwork, numbers: Iterator[int], ids: dict[str, str]) -> list[Light]:
@@ -82,8 +89,7 @@ class LightKeeper:
 
     def hold(self, light: Light, state: LightState, time: float) -> None:
         """A light shows what a client wants, for the time that it has for this."""
-        lasts = light.times[{LightState.GREEN: 0, LightState.YELLOW: 1, LightState.RED: 2}[state]]
-        light.held = state, time + lasts
+        light.held = state, time
         self._pass_on(light.post.light)
         self.update(time)
 
@@ -104,7 +110,7 @@ class LightKeeper:
     def update(self, time: float) -> None:
         """Takes down what the lights show, and ends what clients wanted where its time is over."""
         for light in self.actors:
-            if light.held is not None and time > light.held[1] and not self.is_frozen(light):
+            if light.held is not None and time > light.holds_until and not self.is_frozen(light):
                 light.held = None
                 self._pass_on(light.post.light)
         shown = {light.id: light.state for light in self.shown()}

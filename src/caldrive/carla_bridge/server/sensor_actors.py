@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,8 +23,8 @@ class SensorActor(Actor):
 
     every: float = 0.0
     """s between two messages; 0 for one in each step."""
-    due: float = 0.0
-    """s of the next."""
+    due: float = -math.inf
+    """s of the next; long ago for who has said nothing yet."""
     size: tuple[int, int] = (0, 0)
     """Of an image, pixels."""
     fov: float = 90.0

@@ -15,6 +15,7 @@ from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.instances import Body, Pictures, instances, semantic_scan, with_cosines
 from caldrive.carla_bridge.server.instruments import collisions, gnss, imu, obstacle
 from caldrive.carla_bridge.server.lidar import Rays, lidar_settings, scan
+from caldrive.carla_bridge.server.outbox import Log
 from caldrive.carla_bridge.server.radar import detections, radar_settings
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.snapshot import Sensor, header
@@ -54,9 +55,19 @@ class Senses:
         """What a sensor says now."""
         if episode.time < sensor.due - 1e-6 or sensor.kind not in self._say:
             return
-        sensor.due = max(sensor.due + sensor.every, episode.time) if sensor.every else episode.time
+        is_late = episode.time - sensor.due >= sensor.every
+        sensor.due = sensor.every + (episode.time if is_late else sensor.due)
         for number, pieces in self._say[sensor.kind](sensor, episode):
             yield [header(number, frame, episode.time, sensor.place), *pieces]
+
+    def heard(self, sensor: SensorActor, episode: Episode, frame: int, log: Log) -> list[Message]:
+        """Likewise. A fault silences it."""
+        try:
+            return list(self.messages(sensor, episode, frame))
+        except Exception as error:  # a place or a lens that nobody thought of
+            log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: it falls silent")
+            sensor.is_silent = True
+            return []
 
     def warm_up(self, episode: Episode) -> None:
         """Draws something small, so that no client has to wait until that is compiled."""
@@ -129,7 +140,8 @@ class Senses:
     def _rays(self, sensor: SensorActor, episode: Episode) -> Rays:
         """The same in each run of the same program."""
         scene = episode.scene(sensor.place, sensor.parent)
-        rng = np.random.default_rng((sensor.id, round(1000 * episode.time)))
+        number, wish = sensor.id - episode.spectator.id, sensor.description.number("noise_seed", 0, 0, 2**32)
+        rng = np.random.default_rng((int(wish), number, round(1000 * episode.time)))
         views = lambda camera: self.rig.distances_from(camera, scene)[..., None]  # noqa: E731
         return Rays(max(sensor.every, episode.delta), views, rng)
 

@@ -6,38 +6,34 @@ world stands at its beginning, so that a program that comes alone finds the same
 
 from __future__ import annotations
 
-import math
 import selectors
 import sys
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, suppress
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from caldrive.carla_bridge.server import snapshot
 from caldrive.carla_bridge.server.actors import Actor
-from caldrive.carla_bridge.server.calls import Call, serve
+from caldrive.carla_bridge.server.calls import Call, serve, turned_down
 from caldrive.carla_bridge.server.clients import Clients
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
+from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
-from caldrive.carla_bridge.server.wire import Request, refused
+from caldrive.carla_bridge.server.wire import Request
 from caldrive.world.town import load_town
 
 if TYPE_CHECKING:  # it needs what draws
     from caldrive.carla_bridge.server.run_recording import RunRecording
 
 FIRST_FRAME = 1  # a client that waits for its first snapshot passes over a frame 0
-FREE_STEP = 0.05  # s of a step by the clock, as CARLA's at 20 frames a second
-GRACE = 1.0  # s after a call until the clock begins to move the world: time to ask for synchronous mode
-LONGEST_GRACE = 5.0  # s after the first call
-LONGEST_STEP = 1.0  # s
+LONGEST_STEP = 10.0  # s
+SERVING = 0.01  # s of calls between two looks at the clock
 
 
 class Server:
@@ -50,7 +46,7 @@ class Server:
         self.managers: dict[int, tuple[str, int]] = {}
         """Traffic managers that clients run: port to host and owner."""
         self.calls: dict[str, Call] = {}
-        self._first_call, self._next_step = math.inf, math.inf  # s by the clock
+        self._pace = Pace()
         with ExitStack() as stack:
             host, port = settings.host, settings.port
             self.clients = Clients(listening(host, port), self.log, self._result, self._forget)
@@ -64,7 +60,7 @@ class Server:
             stack.callback(lambda: self._senses.close())
             self.episode = self._begin(settings.town)
             stack.callback(lambda: self.episode.close())
-            self._latest = self._snapshot()
+            self._latest = self.episode.snapshot(self.frame)
             self.close = stack.pop_all().close
             """Ends it all."""
 
@@ -98,20 +94,21 @@ class Server:
         for actor in self.sensors():
             self.streams.close_stream(actor.stream)
         self.episode.close()
-        self._next_step = max(self._next_step, time.monotonic() + GRACE)
+        self._pace.begin_loaded()
         try:
             self.episode = self._begin(town or old)
         except (ValueError, OSError, RuntimeError):
             self.episode = self._begin(old)
             raise
         finally:
-            self._latest = self._snapshot()
+            self._latest = self.episode.snapshot(self.frame)
 
     def warm_up(self) -> None:
         """Does once what clients would have to wait for the first time; then all is as it was."""
         self.episode.step(FREE_STEP)
         self._senses.warm_up(self.episode)
         self.begin()
+        self._pace.begin()
 
     def run(self) -> None:
         """Serves until it is interrupted."""
@@ -122,9 +119,14 @@ class Server:
         """Waits until something happens, at most some seconds, and does it."""
         for key, _ in self._selector.select(self._patience(patience)):
             key.data()
-        now = time.monotonic()
-        if self.clients and not self.rules.synchronous and now >= self._next_step:
-            self._next_step = max(self._next_step + (self.rules.delta or FREE_STEP), now)
+        self.clients.serve_some(SERVING)
+        if not self.clients or self.rules.synchronous or self._pace.left() > 0.0:
+            return
+        if self._pace.owes_frame:
+            self._pace.show()
+            self._show()
+        else:
+            self._pace.step(self.rules.delta)
             self._tick_by_the_clock()
 
     def _tick_by_the_clock(self) -> None:
@@ -135,26 +137,36 @@ class Server:
             self.log(
                 f"found a fault of the program ({type(error).__name__}: {error}), wanted none: the town begins again"
             )
-            self.begin()
+            self._begin_again(self.episode.town.name)
+
+    def _begin_again(self, town: str) -> None:
+        """Another episode that no client asked for."""
+        try:
+            self.begin(town)
+        except (ValueError, OSError, RuntimeError) as error:
+            self.log(f"found that {town} cannot begin again ({error}), wanted it: start the server anew")
 
     def _patience(self, most: float) -> float:
-        """s until the clock moves the world."""
-        if not self.clients or self.rules.synchronous:
-            return most
-        return min(most, max(0.0, self._next_step - time.monotonic()))
+        """s to wait for the next call."""
+        if self.clients.is_busy:
+            return 0.0
+        return most if not self.clients or self.rules.synchronous else min(most, self._pace.left())
 
     def _result(self, caller: int, request: Request) -> Any:
         """What a call gives. A fault of the program costs one call, not all clients."""
-        if self.frame == FIRST_FRAME and not self.rules.synchronous:
-            now = time.monotonic()
-            self._first_call = min(self._first_call, now)
-            self._next_step = min(now + GRACE, self._first_call + LONGEST_GRACE)
+        if not self.rules.synchronous:
+            self._pace.hear()
         try:
-            return serve(self.calls, caller, request)
+            result = serve(self.calls, caller, request)
         except Exception as error:  # the last door before everybody's world
             self.log(f"found a fault of the program in {request.method} ({type(error).__name__}: {error}), wanted none")
-            found = self.calls[request.method]
-            return refused(f"found a fault of caldrive in {request.method}, wanted none: see its output", found.is_void)
+            return turned_down(
+                f"found a fault of caldrive in {request.method}, wanted none: see its output",
+                self.calls[request.method],
+            )
+        if self.episode.has_changed and self._pace.stands and not (self.rules.synchronous or self._pace.owes_frame):
+            self._show()  # in CARLA the next frame, which comes at once, shows who was spawned
+        return result
 
     def _forget(self, client: int) -> None:
         """A client has gone, and what was its own goes with it."""
@@ -163,12 +175,12 @@ class Server:
             return
         if client in self._rules:
             del self._rules[client]
-            self._next_step = time.monotonic()
+            self._pace.go_on()
         if not self.clients:  # who comes next finds what the first one found
             self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
             self._rules.clear()
-            self._first_call = self._next_step = math.inf
-            self.begin(self.settings.town)
+            self._begin_again(self.settings.town)
+            self._pace.begin()
             return
         for actor in self.episode.all(Actor):
             if actor.owner == client and self.episode.get(actor.id) is actor:
@@ -183,7 +195,7 @@ class Server:
         """Other settings from now on, of a client that they go with."""
         self._rules.pop(owner, None)
         self._rules[owner] = rules
-        self._next_step = max(self._next_step, time.monotonic())
+        self._pace.go_on()
 
     def reset_rules(self) -> None:
         """The usual settings."""
@@ -202,29 +214,18 @@ class Server:
     def tick(self) -> int:
         """Moves the world on by a step and tells everybody; returns its frame."""
         self.streams.settle()
-        self.frame += 1
-        self.episode.step(min(self.rules.delta or FREE_STEP, LONGEST_STEP))
-        self._latest = self._snapshot()
-        self.streams.send(WORLD, self._latest)
+        self._pace.stands = False
+        self.episode.step(self.rules.delta or FREE_STEP)
+        self._show()
         heard = []
         for sensor in self.sensors():
             is_off = sensor.is_silent or (self.rules.no_rendering and ".camera." in sensor.kind)
             if self.streams.is_wanted(sensor.stream) and not is_off:
-                heard += [(sensor, message) for message in self._hear_sensor(sensor)]
+                for message in self._senses.heard(sensor, self.episode, self.frame, self.log):
+                    self.streams.send(sensor.stream, message)
+                    heard.append((sensor, message))
         self._record(heard)
         return self.frame
-
-    def _hear_sensor(self, sensor: SensorActor) -> list[Message]:
-        """Sends what a sensor says. A fault silences it."""
-        try:
-            messages = list(self._senses.messages(sensor, self.episode, self.frame))
-            for message in messages:
-                self.streams.send(sensor.stream, message)
-        except Exception as error:  # a place or a lens that nobody thought of
-            self.log(f"found a fault in {sensor.kind} ({type(error).__name__}: {error}), wanted none: it falls silent")
-            sensor.is_silent = True
-            return []
-        return messages
 
     def _record(self, heard: Sequence[tuple[SensorActor, Message]]) -> None:
         """Takes down the last step. A full disk ends the recording, and not the server."""
@@ -236,13 +237,12 @@ class Server:
             self.log(f"found that {self.settings.record} cannot be written ({error.strerror}), wanted room: it ends")
             self._recording = None
 
-    def _snapshot(self) -> Sequence[Any]:
-        """Who is where now."""
-        episode = self.episode
-        place = snapshot.header(snapshot.Sensor.WORLD, self.frame, episode.time)
-        head = snapshot.world_head(episode.number, episode.time, episode.delta)
-        return [b"".join((place, head, *episode.rows()))]
+    def _show(self) -> None:
+        """Tells everybody who is where now: a frame."""
+        self.frame += 1
+        self._latest = self.episode.snapshot(self.frame)
+        self.streams.send(WORLD, [self._latest])
 
     def _newcomer(self, stream: int) -> Sequence[Any] | None:
         """What a new subscriber gets at once: the latest snapshot."""
-        return self._latest if stream == WORLD else None
+        return [self._latest] if stream == WORLD else None

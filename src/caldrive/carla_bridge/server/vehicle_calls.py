@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from caldrive.carla_bridge.server.actor_calls import ActorCalls, finite
+from caldrive.carla_bridge.server.actors import Actor
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.layouts import (
     AckermannControl,
@@ -17,6 +18,7 @@ from caldrive.carla_bridge.server.layouts import (
     Vector,
     VehicleControl,
     WalkerControl,
+    Wheel,
     placement,
 )
 from caldrive.carla_bridge.server.server import Server
@@ -33,6 +35,11 @@ class VehicleCalls:
 
     def _vehicle(self, number: int) -> Vehicle:
         return self._actors.find(number, Vehicle)
+
+    def _any_vehicle(self, number: int) -> Actor:
+        """A client's vehicle, or one of the town's own. Raises Refusal where it is none."""
+        found = self._server.episode.get(number)
+        return found if found and found.kind.startswith("vehicle.") else self._vehicle(number)
 
     @call("apply_control_to_vehicle")
     def control(self, caller: int, number: int, control: VehicleControl) -> None:
@@ -64,7 +71,8 @@ class VehicleCalls:
     @call("get_physics_control")
     def physics(self, caller: int, number: int) -> PhysicsControl:
         """With the constants of the bicycle model."""
-        return physics_of(self._vehicle(number))
+        found = self._any_vehicle(number)
+        return physics_of(found) if isinstance(found, Vehicle) else PhysicsControl(wheels=(Wheel(),) * 4)
 
     @call("apply_physics_control")
     def set_physics(self, caller: int, number: int, physics: PhysicsControl) -> None:
@@ -74,7 +82,8 @@ class VehicleCalls:
     @call("get_vehicle_light_state")
     def vehicle_lights(self, caller: int, number: int) -> tuple[int]:
         """As they were set."""
-        return (self._vehicle(number).lights,)
+        found = self._any_vehicle(number)
+        return (found.lights if isinstance(found, Vehicle) else 0,)
 
     @call("set_vehicle_light_state")
     def set_vehicle_lights(self, caller: int, number: int, flags: tuple[int]) -> None:
@@ -89,9 +98,9 @@ class VehicleCalls:
     @call("get_telemetry_data")
     def telemetry(self, caller: int, number: int) -> tuple[Any, ...]:
         """Speed and pedals; a bicycle model knows nothing of its wheels."""
-        vehicle = self._vehicle(number)
-        control, wheels = vehicle.control, [(0.0,) * 11 for _ in range(4)]
-        return abs(vehicle.state.speed), control.steer, control.throttle, control.brake, 0.0, 1, 0.3, wheels
+        vehicle, wheels = self._any_vehicle(number), [(0.0,) * 11 for _ in range(4)]
+        control = vehicle.control if isinstance(vehicle, Vehicle) else VehicleControl()
+        return math.hypot(*vehicle.motion[0]), control.steer, control.throttle, control.brake, 0.0, 1, 0.3, wheels
 
     @call("get_wheel_steer_angle")
     def wheel_angle(self, caller: int, number: int, wheel: int) -> float:

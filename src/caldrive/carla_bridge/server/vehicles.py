@@ -77,6 +77,8 @@ class Vehicle(Actor):
         self.state = drive(before, self.control, dt, self.config)
         speed = self.state.speed + self.pushed / self.physics.mass * dt
         self.pushed = 0.0
+        if self.description.get("sticky_control", "true").lower() == "false":
+            self.control = VehicleControl()
         self.state = replace(self.state, speed=speed if self.constant_speed is None else self.constant_speed)
 
     def note_motion(self, before: EgoState, dt: float) -> None:
@@ -166,7 +168,9 @@ def physics_of(vehicle: Vehicle) -> PhysicsControl:
             pose.x + c * ahead - s * left * config.width, pose.y + s * ahead + c * left * config.width, 0.33
         )
         steers = math.degrees(config.max_steer) if k < 2 else 0.0
-        wheels.append(Wheel(max_steer_angle=steers, position=Vector(x * CM, y * CM, z * CM)))
+        wheel = vehicle.physics.wheels[k] if k < len(vehicle.physics.wheels) else Wheel()
+        position = Vector(x * CM, y * CM, z * CM)
+        wheels.append(msgspec.structs.replace(wheel, max_steer_angle=steers, position=position))
     return msgspec.structs.replace(vehicle.physics, wheels=tuple(wheels))
 
 
