@@ -216,10 +216,18 @@ class Connection:
 
     def close(self) -> None:
         """Removes all that was spawned and puts the settings back, if the server still hears it."""
-        works = [self.clear, self._end_manager, self._put_back] if self.is_alive() else [self._end_manager]
-        for work in works:
+        for work in (self.clear, self._end_manager, self._put_back) if self.is_alive() else ():
             with suppress(RuntimeError):  # it has gone meanwhile, and all with it
                 work()
+
+    def require_no_manager(self) -> None:
+        """Raises RuntimeError where a traffic manager drove for a server that has gone: CARLA's client would step it
+        together with the next server's, miss the old server, and abort this process."""
+        if self._manager is not None:
+            raise RuntimeError(
+                f"found that {self._address} has gone while CARLA's traffic manager drove cars there, wanted the same "
+                "server: start it again, and type this again; what is done is kept"
+            )
 
     def _put_back(self) -> None:
         if self._before is not None:

@@ -62,7 +62,7 @@ class CarlaWorld(EpisodeWorld[Episode]):
                 connection.clear()
         else:
             if connection is not None:
-                connection.close()  # its traffic manager would go on, and end this process
+                connection.require_no_manager()
             connection = Connection(self._host, self._port)
         self._connection = connection
         connection.synchronise()
