@@ -34,9 +34,9 @@ class FakeTraining:
 
 def test_every_system_has_its_variants_and_seeds() -> None:
     commands = {name: make(Path("data"), Path("out") / name) for name, make in TRAININGS.items()}
-    assert [name for name in commands if name.startswith("cil")] == [
+    assert {name for name in commands if name.startswith("cil")} == {
         f"cil-{preset}-{seed}" for preset in ("published", "cal-backbone") for seed in (0, 1, 2)
-    ]
+    }
     assert {name for name in commands if name.startswith("mp")} == {"mp-published", "mp-all-frames"}
     assert len([name for name in commands if name.startswith("rl")]) == 9
     assert commands["cil-cal-backbone-2"].training.seed == 2
@@ -44,7 +44,10 @@ def test_every_system_has_its_variants_and_seeds() -> None:
     assert commands["mp-published"].training.frames == 2500
     assert (commands["rl-paper-0"].training.steps, commands["rl-modern-1"].training.steps) == (2_000_000, 3_000_000)
     assert commands["rl-modern-1"].training.encoder == Path("out/mp-all-frames/model.safetensors")
-    assert list(commands).index("mp-all-frames") < list(commands).index("rl-modern-0")
+    order = list(commands)
+    assert order.index("mp-all-frames") < order.index("rl-modern-0")
+    firsts = ("mp-all-frames", "cil-published-0", "rl-affordances-0", "rl-paper-0")
+    assert max(map(order.index, firsts)) < order.index("cil-published-1")  # each system before any other seed
 
 
 def test_what_is_there_is_kept_and_a_run_that_was_stopped_goes_on(
@@ -58,12 +61,14 @@ def test_what_is_there_is_kept_and_a_run_that_was_stopped_goes_on(
     monkeypatch.setattr(FakeTraining, "killed", None)
     assert verb.run(silent).values["models"]["three"] == str(tmp_path / "out" / "three" / "model.safetensors")
     lines = [json.loads(line) for line in (tmp_path / "out" / "log.jsonl").read_text().splitlines()]
-    assert [line["training"] for line in lines] == ["one", "two", "three"]
+    assert [(line["training"], line["done"]) for line in lines] == [
+        ("one", True), ("two", False), ("two", True), ("three", True),
+    ]  # fmt: skip
     replace(verb, only=("two",)).run(silent)
-    assert len((tmp_path / "out" / "log.jsonl").read_text().splitlines()) == 3
+    assert len((tmp_path / "out" / "log.jsonl").read_text().splitlines()) == 4
 
 
 def test_a_training_that_there_is_not_is_named(tmp_path: Path) -> None:
     refused = run_json("baselines", "--only", "cil-7", "--out", str(tmp_path / "out"), code=2)
-    assert "found --only cil-7, wanted one of cil-published-0, " in refused["error"]
+    assert "found --only cil-7, wanted one of mp-" in refused["error"]
     assert not (tmp_path / "out").exists()

@@ -33,7 +33,7 @@ def test_the_papers_reward_is_a_point_a_metre_and_takes_two_for_the_whole_car_on
     slower = replace(START.ego, speed=4.0)
     now = replace(START, route_done=3.0, sidewalk_share=0.5, opposite_share=0.25, contacts=(crash,), ego=slower)
     assert rewards("carla2017", START, now) == pytest.approx(
-        {"distance": 3.0, "speed": -0.18, "damage": -0.1, "sidewalk": -1.0, "opposite_lane": -0.5}
+        {"distance": 3.0, "speed": -0.18, "damage": -10.0, "sidewalk": -1.0, "opposite_lane": -0.5}
     )
     assert rewards("carla2017", now, START)["sidewalk"] == pytest.approx(1.0)
 

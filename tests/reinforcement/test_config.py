@@ -32,3 +32,11 @@ def test_half_of_the_episodes_are_of_the_newest_task() -> None:
 
 def test_without_a_share_all_tasks_are_driven_at_once() -> None:
     assert Curriculum(TASKS, advance_at=0.0, window=2).drawn() == TASKS
+
+
+def test_it_moves_on_in_any_case_when_a_tasks_share_of_the_decisions_is_over() -> None:
+    found = Curriculum(("straight", "one-turn", "navigation", "navigation-dynamic"), advance_at=0.8, window=2)
+    assert [found.keep_up(share) for share in (0.1, 0.24, 0.26, 0.3, 0.51, 1.0)] == [
+        False, False, True, False, True, True,
+    ]  # fmt: skip
+    assert found.level == 3

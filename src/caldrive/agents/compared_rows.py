@@ -88,7 +88,7 @@ def _make_rl(settings: AgentSettings, dt: float, truth: TruthSource | None) -> A
     """The agent that drives by a policy; one that sees affordances has CAL's network for them, or the truth."""
     from caldrive.agents.reinforcement.agent import load_agent
 
-    return load_agent(model_path(settings.model, "rl"), lambda: _affordance_source(truth))
+    return load_agent(model_path(settings.model, "rl"), lambda: _affordance_source(truth), settings.cap)
 
 
 def _affordance_source(truth: TruthSource | None) -> Perception:

@@ -59,7 +59,7 @@ class KeyFrameSelector:
 
 @dataclass(frozen=True)
 class Controls:
-    """What the driver wanted, and what moved the car."""
+    """What who knows the truth would do, and what moved the car."""
 
     clean: Control
     driven: Control
@@ -72,15 +72,16 @@ def record_episode(world: RecordableWorld, config: CollectConfig, number: int, f
     """
     rng = np.random.default_rng([config.seed, number])
     plan = plan_episode(config, number, rng)
-    observation, agent = begin_episode(world, config, plan, rng)
+    observation, agent, honest = begin_episode(world, config, plan, rng)
     cameras = _cameras(config, rng)
     perturbation, delay = ControlPerturbation(rng), DelayedStart(rng)
     selector = KeyFrameSelector(round(config.duration / world.dt), plan.tailgating)
     with EpisodeWriter(episode_path(folder, number), plan.scenario) as writer:
         for index in range(selector.max_steps):
             is_key_frame = selector.select(world.truth().affordances, observation.speed)
-            clean = agent.act(observation)
-            driven = delay.apply(perturbation.apply(clean, observation.speed), observation.speed)
+            wanted = agent.act(observation)
+            clean = wanted if honest is agent else honest.act(observation)
+            driven = delay.apply(perturbation.apply(wanted, observation.speed), observation.speed)
             if is_key_frame:
                 controls = Controls(clean=clean, driven=driven)
                 for frame in _frames(world, observation, cameras, index, controls, config.semantic):

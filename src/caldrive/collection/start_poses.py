@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from caldrive.agents.cal import CALAgent
+from caldrive.agents.cal import CALAgent, OraclePerception
 from caldrive.collection.config import CollectConfig
 from caldrive.collection.oracles import random_oracle
 from caldrive.control.controller import CALController, ControlConfig
@@ -100,14 +100,19 @@ def _cars(config: CollectConfig, tailgating: bool, most: int, rng: np.random.Gen
 
 def begin_episode(
     world: RecordableWorld, config: CollectConfig, plan: EpisodePlan, rng: np.random.Generator
-) -> tuple[Observation, CALAgent]:
-    """The first observation, and the driver, ready."""
+) -> tuple[Observation, CALAgent, CALAgent]:
+    """The first observation, the driver, and one in his place who is told the truth, both ready. They are the same but
+    where the driver is deceived: what a recording tells others to do is what the other one would."""
     cap = CAPS[0] if plan.tailgating else CAPS[int(rng.integers(len(CAPS)))]
     oracle = random_oracle(world.truth, config, plan.tailgating, rng)
     # A driver to whom no car is reported must not take the car before it for no hazard after a while.
-    agent = CALAgent(oracle, CALController(ControlConfig(patience=PatienceConfig(enabled=False), cap=cap)))
+    laws = ControlConfig(patience=PatienceConfig(enabled=False), cap=cap)
+    agent = honest = CALAgent(oracle, CALController(laws))
+    if type(oracle) is not OraclePerception:
+        honest = CALAgent(OraclePerception(world.truth), CALController(laws))
     observation = world.reset(plan.scenario, route=plan.route, appearance=plan.appearance)
     if rng.random() < config.displaced:
         observation = world.displace(float(rng.uniform(*OFFSETS)), float(rng.uniform(-MAX_TURN, MAX_TURN)))
     agent.reset()
-    return observation, agent
+    honest.reset()
+    return observation, agent, honest

@@ -14,6 +14,7 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError("found no gymnasium, wanted it: type pip install 'caldrive[gym]'") from error
 
+from caldrive.driving.rules import COLLISION
 from caldrive.gym.config import EnvConfig
 from caldrive.gym.env import DrivingEnv
 
@@ -24,7 +25,9 @@ ENVIRONMENTS = {  # by id: the settings
     "caldrive/Town02-v0": EnvConfig(towns=("town02",), weathers=tuple(range(1, 15))),
     "caldrive/Town01Traffic-v0": EnvConfig(tasks=("navigation-dynamic",)),
     "caldrive/Town01Affordances-v0": EnvConfig(observation="affordances"),
-    "caldrive/Town01Carla2017-v0": EnvConfig(action="carla2017", reward="carla2017", rules="corl2017"),
+    "caldrive/Town01Carla2017-v0": EnvConfig(
+        action="carla2017", reward="carla2017", rules="corl2017", ends=tuple(COLLISION.values())
+    ),
 }
 
 

@@ -89,7 +89,8 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Drives on for `frame_skip` steps of 0.1 s, or until the episode ends."""
-        drive, control, total = self._current, control_of(self.config.action, action), dict[str, float]()
+        drive, total = self._current, dict[str, float]()
+        control = control_of(self.config.action, action, drive.observation.speed)
         for _ in range(self.config.frame_skip):
             observation = self._move(drive, control, total)
             if drive.has_ended:
@@ -101,6 +102,11 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
         terminated = outcome in (Outcome.SUCCESS, Outcome.FAILED) or drive.left_route
         truncated = outcome is Outcome.TIMEOUT and not terminated
         return observed(self.config, observation, drive.truth), reward, terminated, truncated, info
+
+    def drive_on(self, control: Control) -> bool:
+        """A step with a control of somebody else's, without a reward; returns whether the episode has ended."""
+        self._move(self._current, control, {})
+        return self._current.has_ended
 
     def render(self) -> Any:
         """The image of the last step (H, W, 3), None without a render mode."""

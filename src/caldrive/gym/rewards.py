@@ -53,7 +53,8 @@ class Preset:
 
 def carla2017_terms(transition: Transition) -> dict[str, float]:
     """S.2.3: kilometres towards the goal along the route, km/h gained, damage (impulses in N s), and how much more of
-    the car is on the sidewalk and on the opposite lane."""
+    the car is on the sidewalk and on the opposite lane. The paper's weight of damage, 0.00002, is for CARLA before 0.8,
+    whose unit was a hundredth: its released agent multiplies newer impulses by 100."""
     before, now = transition.before, transition.now
     return {
         "distance": (now.route_done - before.route_done) / 1000,
@@ -104,7 +105,7 @@ def _to_closed_light(truth: Truth) -> float:
 
 PRESETS: Mapping[str, Preset] = {
     "carla2017": Preset(
-        carla2017_terms, {"distance": 1000.0, "speed": 0.05, "damage": 0.00002, "sidewalk": 2.0, "opposite_lane": 2.0}
+        carla2017_terms, {"distance": 1000.0, "speed": 0.05, "damage": 0.002, "sidewalk": 2.0, "opposite_lane": 2.0}
     ),
     "roach": Preset(roach_terms, {"speed": 1.0, "position": 1.0, "angle": 1.0, "steering": 0.1, "end": 1.0}),
 }

@@ -113,7 +113,7 @@ def targets(episode: Episode) -> NDArray[np.float32]:
 
 def _commands(episode: Episode) -> NDArray[np.int64]:
     """The format's command of each frame (N,): to follow the lane where the next junction is more than FOLLOW_DISTANCE
-    away. Our commands are those for the next junction, however far it is. Where a recording ends before that is known,
+    away, where ours is straight. Where a recording ends before that is known,
     the command stays."""
     columns = episode.columns
     numbers = np.array([COMMAND_NUMBERS[Command(command)] for command in columns["command"]])

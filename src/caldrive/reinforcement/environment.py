@@ -15,7 +15,7 @@ from caldrive.agents.reinforcement.config import FRAME, N_FRAMES, PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder
 from caldrive.agents.reinforcement.inputs import Eye, PolicyInputs, control_of
 from caldrive.agents.rows import model_path
-from caldrive.datatypes import CameraConfig
+from caldrive.datatypes import CameraConfig, Control
 from caldrive.driving.rules import COLLISION
 from caldrive.gym.config import EnvConfig
 from caldrive.gym.env import DrivingEnv
@@ -25,6 +25,7 @@ from caldrive.reinforcement.config import ReinforcementConfig
 from caldrive.results import InfractionKind
 
 EARLY_ENDS = (InfractionKind.SIDEWALK, InfractionKind.RED_LIGHT)
+START_ACTIONS = 10  # steps of full throttle with the wheel anywhere, before the paper's RL decides
 MOST = 1e6  # of a number that a policy is given: an encoder's have no bound of their own
 
 
@@ -46,11 +47,21 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, dict[str, Any], Any]):
         """Starts an episode, see `DrivingEnv.reset`."""
         _, info = self.driving.reset(seed=seed, options={"config": {"tasks": self.tasks}} | (options or {}))
         self._inputs.reset()
+        if self._policy.action == "carla2017":
+            self._set_off()
         return self._see(), info
+
+    def _set_off(self) -> None:
+        """Full throttle with the wheel anywhere for a second, as the paper's RL begins its episodes: by chance among
+        its nine actions, of which some brake, a car hardly moves."""
+        for _ in range(START_ACTIONS):
+            steer = float(self.driving.np_random.uniform(-1.0, 1.0))
+            if self.driving.drive_on(Control(throttle=1.0, steer=steer)):
+                self.driving.reset(options={"config": {"tasks": self.tasks}})  # it was run into
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Drives on while the decision holds, or until the episode ends; the rewards add up."""
-        total = 0.0
+        total, speed = 0.0, self.driving.observation.speed
         for k in range(self._policy.repeat):
             if k:
                 self._watch()
@@ -58,7 +69,9 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, dict[str, Any], Any]):
             total += reward
             if terminated or truncated:
                 break
-        self._inputs.acted(control_of(self._policy.action, action))
+        self._inputs.acted(control_of(self._policy.action, action, speed))
+        if terminated and info["is_success"] and self.driving.config.reward == "roach":
+            terminated, truncated = False, True  # the road goes on behind the goal, which the policy does not see
         return self._see(), total, terminated, truncated, info
 
     def _watch(self) -> None:

@@ -103,6 +103,8 @@ class LearningRun:
         for ended in notes.ended:
             if self.curriculum.note(ended.task, ended.success):
                 self._set_tasks()
+        if self.curriculum.keep_up(self.update / self.config.updates):
+            self._set_tasks()
         logged = self.model.logger.name_to_value
         return {"step": self.steps, **self._figures(notes), **_losses(logged)}
 

@@ -187,7 +187,7 @@ def test_a_world_without_a_second_camera_is_refused() -> None:
 
 def test_without_a_network_a_sentence_says_what_to_type(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("caldrive.agents.rows.MODELS", tmp_path)
-    with pytest.raises(FileNotFoundError, match=r"wanted one for the agent mp: type .*caldrive train --agent mp"):
+    with pytest.raises(FileNotFoundError, match=r"wanted one for the agent mp: make .*caldrive train --agent mp"):
         set_up(AgentSettings(agent="mp"))
 
 

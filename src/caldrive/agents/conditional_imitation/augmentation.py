@@ -44,9 +44,10 @@ def _blur(images: Tensor, generator: Generator) -> Tensor:
 
 
 def _noise(images: Tensor, generator: Generator) -> Tensor:
-    """Additive Gaussian noise of a standard deviation up to 0.05, half the time another one in each channel."""
+    """Additive Gaussian noise of a standard deviation up to 0.05 of 255, as posted for images in bytes, half the time
+    another one in each channel."""
     n, _, height, width = images.shape
-    deviation = _uniform(n, 0.0, 0.05, generator)[:, None, None, None]
+    deviation = _uniform(n, 0.0, 0.05 / 255, generator)[:, None, None, None]
     apart = torch.randn(images.shape, generator=generator)
     alike = torch.randn(n, 1, height, width, generator=generator)
     by_channel = torch.rand(n, 1, 1, 1, generator=generator) < 0.5

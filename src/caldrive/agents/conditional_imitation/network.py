@@ -5,7 +5,7 @@
     image  -> ... the same 512 -----------> 256 -> 256 -> speed
 
 The CARLA paper's table S.1 has three layers behind the speed, the released agent two, which are taken. Its fourth
-branch, for "follow the lane", has no counterpart here: the command is that of the next junction all the way.
+branch, for "follow the lane", has no counterpart here: the command is straight but from 20 m before a turn to its end.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from caldrive.recordings.reader import Episode
 from caldrive.recordings.writer import EpisodeError
 
 GAP = 1.0  # s between two frames of a stream from which the way between them is unknown
+STANDING = 0.3  # m/s, below which the car stands
 CLASS_WEIGHTS = {SceneClass.LANE_MARKING: 2.0, SceneClass.DYNAMIC: 2.0}  # thin or rare; 1 for the others
 
 
@@ -104,9 +105,10 @@ def junction_labels(episode: Episode, ahead: float = JUNCTION_AHEAD) -> NDArray[
 def _labels_along(
     inside: NDArray[np.bool_], time: NDArray[np.float64], speed: NDArray[np.float64], ahead: float
 ) -> NDArray[np.float64]:
-    """The labels (N,) of one camera's rows. Where rows are missing for long, the car is taken to have driven far."""
-    gaps = np.diff(time)
-    way = np.where(gaps > GAP, np.inf, (speed[1:] + speed[:-1]) / 2 * gaps)
+    """The labels (N,) of one camera's rows. Where rows are missing for long, the car is taken to have driven far,
+    unless it stands before and after: of those that stand only some rows are kept."""
+    gaps, moves = np.diff(time), np.maximum(speed[1:], speed[:-1]) > STANDING
+    way = np.where((gaps > GAP) & moves, np.inf, (speed[1:] + speed[:-1]) / 2 * gaps)
     labels = np.full(len(inside), np.nan)
     to_junction, known = np.inf, 0.0  # m from a row to the next junction, and of way that is known
     for k in range(len(inside) - 1, -1, -1):

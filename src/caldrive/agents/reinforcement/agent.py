@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -12,7 +14,7 @@ from caldrive.agents.reinforcement.config import FRAME, PolicyConfig
 from caldrive.agents.reinforcement.encoder import Encoder, encode_function
 from caldrive.agents.reinforcement.inputs import AffordanceEye, Eye, FeatureEye, FrameEye, PolicyInputs, control_of
 from caldrive.agents.reinforcement.policy import Policy
-from caldrive.datatypes import CameraConfig, Control, Decision, Observation
+from caldrive.datatypes import KMH, CameraConfig, Control, Decision, Observation
 from caldrive.interfaces import BadImage, Perception
 
 MakePerception = Callable[[], Perception]
@@ -23,13 +25,14 @@ class ReinforcementAgent:
     the best action of its distribution, never one by chance. Where an image is no use it brakes.
 
     decision: the last control, with the affordances where it sees any, and the reason in the note where it brakes
-    blindly; None before the first.
+    blindly; None before the first. cap: km/h, above which there is no throttle.
     """
 
-    def __init__(self, policy: Policy, eye: Eye) -> None:
+    def __init__(self, policy: Policy, eye: Eye, cap: float | None = None) -> None:
         self.policy, self.inputs = policy.eval(), PolicyInputs(eye, policy.config.memory)
         self.decision: Decision | None = None
         self._held, self._control = 0, Control()
+        self._fastest = math.inf if cap is None else cap * KMH
 
     @property
     def perception(self) -> Perception:
@@ -55,6 +58,8 @@ class ReinforcementAgent:
             return self.decision.control
         if self._held == 0:
             self._control = self._decide(observation)
+        if observation.speed > self._fastest:
+            self._control = replace(self._control, throttle=0.0)
         self._held = (self._held + 1) % self.policy.config.repeat
         eye = self.inputs.eye
         seen = eye.affordances if isinstance(eye, AffordanceEye) else None
@@ -69,7 +74,8 @@ class ReinforcementAgent:
     @torch.inference_mode()
     def _decide(self, observation: Observation) -> Control:
         inputs = {name: torch.from_numpy(value)[None] for name, value in self.inputs.see(observation).items()}
-        control = control_of(self.policy.config.action, self.policy(inputs).best()[0].numpy())
+        best = self.policy(inputs).best()[0].numpy()
+        control = control_of(self.policy.config.action, best, observation.speed)
         self.inputs.acted(control)
         return control
 
@@ -90,7 +96,8 @@ def policy_camera(image_size: tuple[int, int] | None) -> CameraConfig:
     return CameraConfig(width=width, height=height)
 
 
-def load_agent(path: Path, perception: MakePerception) -> ReinforcementAgent:
-    """The agent of a file. perception: as in `make_eye`. Raises CheckpointError where the file is no policy."""
+def load_agent(path: Path, perception: MakePerception, cap: float | None = None) -> ReinforcementAgent:
+    """The agent of a file. perception: as in `make_eye`; cap: km/h. Raises CheckpointError where the file is no
+    policy."""
     policy, info, encoder = load_policy(path)
-    return ReinforcementAgent(policy, make_eye(info.policy, encoder, perception))
+    return ReinforcementAgent(policy, make_eye(info.policy, encoder, perception), cap)

@@ -36,10 +36,15 @@ class PolicyConfig:
     """Of the encoder."""
 
     @property
+    def n_own(self) -> int:
+        """How many numbers are its speed, its last decision and the command."""
+        return 1 + N_CONTINUOUS * self.memory + N_COMMANDS
+
+    @property
     def n_numbers(self) -> int:
-        """How many numbers it is given: what it sees, its speed, its last decision and the command."""
+        """How many numbers it is given: what it sees, and its own behind them."""
         seen = {"frames": 0, "features": self.n_features, "affordances": N_AFFORDANCES}
-        return seen[self.sees] + 1 + N_CONTINUOUS * self.memory + N_COMMANDS
+        return seen[self.sees] + self.n_own
 
     @property
     def n_outputs(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def encode_function(encoder: Encoder, threads: int = 1) -> Encode:
     precision = driving_precision("auto", encoder.ranges)
     if precision in INTEGERS:
         torch.set_num_threads(1)  # torch's own would wait for one another beside OpenVINO's
-    backbone = encoder.backbone.eval()
+    backbone = deepcopy(encoder.backbone).eval()  # bf16 turns it, and the encoder is saved with the policy
     engine = backbone_engine(precision, backbone, encoder.image_size, encoder.ranges, threads)
 
     @torch.inference_mode()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from caldrive.agents.reinforcement.config import CARLA2017, FRAME, SIGNS, Action
 from caldrive.compiled import Floats
 from caldrive.datatypes import (
+    KMH,
     MAX_CENTER_DISTANCE,
     MAX_VEHICLE_DISTANCE,
     Affordances,
@@ -27,6 +28,7 @@ Inputs = dict[str, NDArray[Any]]  # numbers (F,), and for a policy with convolut
 Encode = Callable[[Image], Floats]  # an image (H, W, 3) to features (F,)
 
 USUAL_SPEED = 10.0  # m/s, a speed of 1 for the policy
+CARLA2017_FASTEST = 30.0 * KMH  # m/s
 
 
 class Eye(Protocol):
@@ -147,12 +149,12 @@ def affordance_vector(affordances: Affordances) -> NDArray[np.float32]:
     return np.clip(np.array(numbers, np.float32), -1.0, 1.0)
 
 
-def control_of(kind: Action, action: Any) -> Control:
+def control_of(kind: Action, action: Any, speed: float = 0.0) -> Control:
     """An action as a control: the number of one of CARLA2017, or throttle and steering, of which what lies outside
-    [-1, 1] is cut."""
+    [-1, 1] is cut. speed: the car's, m/s; the paper's RL has no throttle from 30 km/h on."""
     if kind == "carla2017":
         throttle, right = CARLA2017[int(action)]
-        return _control(throttle, -right)
+        return _control(min(throttle, 0.0) if speed >= CARLA2017_FASTEST else throttle, -right)
     throttle, steer = np.clip(np.asarray(action, dtype=float), -1.0, 1.0).tolist()
     return _control(throttle, steer)
 

@@ -133,8 +133,28 @@ class Layers(nn.Module):
         return nodes
 
 
+class Joined(nn.Module):
+    """An encoder's features and a few numbers to `hidden` nodes: a layer for the features, two for the numbers, one for
+    both. Side by side in one layer the command would be lost among hundreds of features."""
+
+    def __init__(self, n_features: int, n_own: int, hidden: int) -> None:
+        super().__init__()
+        self.sizes = [n_features, n_own]
+        self.features = _layer(n_features, hidden)
+        self.own = nn.Sequential(*_layer(n_own, hidden), *_layer(hidden, hidden))
+        self.both = _layer(2 * hidden, hidden)
+
+    def forward(self, inputs: dict[str, Tensor]) -> Tensor:
+        """numbers (N, F), the features first, to (N, hidden)."""
+        features, own = torch.split(inputs["numbers"], self.sizes, dim=1)
+        both: Tensor = self.both(torch.cat((self.features(features), self.own(own)), dim=1))
+        return both
+
+
 def trunk(config: PolicyConfig) -> nn.Module:
     """What is below the outputs of a policy, or of the value that its training estimates."""
+    if config.sees == "features":
+        return Joined(config.n_features, config.n_own, config.hidden)
     kind = Convolutions if config.sees == "frames" else Layers
     return kind(config.n_numbers, config.hidden)
 

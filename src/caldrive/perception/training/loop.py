@@ -23,6 +23,7 @@ from caldrive.recordings.folder import find_episodes, split
 from caldrive.scenarios import require_to_learn_from
 
 Stop = Callable[[int], bool]
+SPLIT_SEED = 0  # whatever a training's own: networks of other seeds learn from the same episodes
 
 
 def never(step: int) -> bool:
@@ -46,7 +47,7 @@ def read_frames(
     episodes = find_episodes(data, semantic=config.wants_semantics)
     for town in {episode.scenario.town for episode in episodes}:
         require_to_learn_from(town)
-    training, validation = split(episodes, config.validation_share, config.seed)
+    training, validation = split(episodes, config.validation_share, SPLIT_SEED)
     if not semantic_validation:
         validation = [replace(episode, semantics=None) for episode in validation]
     return TrainingFrames(Frames(training, size, config.cache_gb), Frames(validation, size))
