@@ -70,7 +70,7 @@ def test_a_drive_without_video_says_what_is_written_instead(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     shown = " ".join(helped("drive", capsys).replace("│", " ").split())
-    assert "--no-video leaves out drive.mp4 and the plots of speed (PNG), and writes each episode's trace" in shown
+    assert "--no-video writes each episode's trace (episode-000.json) alone" in shown
 
 
 def test_settings_are_asked_for_only_of_verbs_that_take_them(capsys: pytest.CaptureFixture[str]) -> None:

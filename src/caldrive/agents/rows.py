@@ -42,9 +42,10 @@ def model_path(model: Path | None, agent: str = "cal", option: str = "--model") 
     """The model asked for by an option, or the package's for an agent. Raises FileNotFoundError where there is none."""
     shipped = MODELS / f"{agent}.safetensors"
     if model is None and not shipped.is_file():
+        other = ", or type --agent oracle" if option == "--model" else ""
         raise FileNotFoundError(
             f"found no trained network in this package, wanted one for the agent {agent}: "
-            f"make one with `caldrive train --agent {agent}` and give it with {option} FILE"
+            f"make one with `caldrive train --agent {agent}` and give it with {option} FILE{other}"
         )
     return model or shipped
 
