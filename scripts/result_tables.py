@@ -13,11 +13,13 @@ from pathlib import Path
 from caldrive.benchmark.metrics import Cell, cells, red_light_counts, speeding, touch_rates, wilson
 from caldrive.benchmark.published import SYSTEMS, success
 from caldrive.benchmark.report.runs import BenchmarkRun, load_run, suites
-from caldrive.benchmark.suites import COLLISIONS, CONDITIONS, DENSITIES, TrialResult
+from caldrive.benchmark.suites import CONDITIONS, DENSITIES, TrialResult
 from caldrive.driving.tasks import TASKS
+from caldrive.results import InfractionKind
 
 RESULTS = Path(__file__).parents[1] / "docs" / "results"
 Rows = Iterator[Sequence[str]]
+TOUCHED = (InfractionKind.COLLISION_PERSON, InfractionKind.COLLISION_CAR, InfractionKind.COLLISION_OBJECT)
 
 
 def runs_of(folder: Path) -> dict[str, BenchmarkRun]:
@@ -36,8 +38,8 @@ def unseen(folder: Path) -> Rows:
         met, ran = red_light_counts(run.results)
         yield (
             name, *(_success(percents.get(task)) for task in tasks),
-            f"{touched[COLLISIONS[0]].km:.0f}",
-            ", ".join(str(touched[kind].count) for kind in reversed(COLLISIONS)), f"{ran} of {met}",
+            f"{touched[TOUCHED[0]].km:.0f}",
+            ", ".join(str(touched[kind].count) for kind in TOUCHED), f"{ran} of {met}",
         )  # fmt: skip
 
 
@@ -96,7 +98,7 @@ def _by_town(results: Sequence[TrialResult]) -> dict[str, list[TrialResult]]:
 
 
 def _blind_row(results: Sequence[TrialResult]) -> Iterator[str]:
-    car, thing, person = (next(rate for rate in touch_rates(results) if rate.kind is kind) for kind in COLLISIONS)
+    person, car, thing = (next(rate for rate in touch_rates(results) if rate.kind is kind) for kind in TOUCHED)
     reached = sum(cell.successes for cell in cells(results))
     met, ran = red_light_counts(results)
     share, worst = speeding(results)
