@@ -23,13 +23,13 @@ from caldrive.provenance import code_version
 OUT, KEPT = Path("out/results"), Path(__file__).parents[1] / "docs" / "results"
 ORACLE = ["--agent", "oracle"]
 AGENTS = {"oracle": ORACLE, "cal": ["--agent", "cal"]}
-FAST = Path(__file__).with_name("begins_at_60.toml")  # who sees no sign drives as fast as before the first one
+FAST = "scripts/begins_at_60.toml"  # who sees no sign drives as fast as before the first one
 WITHOUT = {  # drivers who know the truth but for something
     "oracle-without-hazards": [*ORACLE, "--blind", "hazard_stop"],
     "oracle-without-distance": [*ORACLE, "--blind", "vehicle_distance"],
     "oracle-without-hazards-and-distance": [*ORACLE, "--blind", "hazard_stop", "--blind", "vehicle_distance"],
     "oracle-without-lights": [*ORACLE, "--blind", "red_light"],
-    "oracle-without-signs": [*ORACLE, "--blind", "speed_sign", "--signs", "--controller", str(FAST)],
+    "oracle-without-signs": [*ORACLE, "--blind", "speed_sign", "--signs", "--controller", FAST],
     "oracle-with-signs": [*ORACLE, "--signs"],
 }
 SUITES = {  # who drives in each; those that come first are known to the later ones

@@ -195,8 +195,7 @@ class Contact:
 class Truth:
     """What really is, for referee, recorder and oracle.
 
-    opposite_share, sidewalk_share: shares in [0, 1] of the car's area on the opposite lane, and beside the road (on
-    the sidewalk, or beyond it).
+    opposite_share, sidewalk_share: shares in [0, 1] of the car's area on the opposite lane, and off the road.
     route_done, route_length: metres along the route. goal_distance: straight line to the goal, m.
     """
 

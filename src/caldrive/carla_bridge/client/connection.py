@@ -220,14 +220,10 @@ class Connection:
             with suppress(RuntimeError):  # it has gone meanwhile, and all with it
                 work()
 
-    def require_no_manager(self) -> None:
-        """Raises RuntimeError where a traffic manager drove for a server that has gone: CARLA's client would step it
-        together with the next server's, miss the old server, and abort this process."""
-        if self._manager is not None:
-            raise RuntimeError(
-                f"found that {self._address} has gone while CARLA's traffic manager drove cars there, wanted the same "
-                "server: start it again, and type this again; what is done is kept"
-            )
+    @property
+    def has_manager(self) -> bool:
+        """Whether CARLA's traffic manager drives cars through it."""
+        return self._manager is not None
 
     def _put_back(self) -> None:
         if self._before is not None:

@@ -61,8 +61,12 @@ class CarlaWorld(EpisodeWorld[Episode]):
             with connection.answers():
                 connection.clear()
         else:
-            if connection is not None:
-                connection.require_no_manager()
+            if connection is not None and connection.has_manager:
+                # It would be stepped together with the next server's, miss its own, and abort this process.
+                raise RuntimeError(
+                    f"found that the server at {self._host}:{self._port} has gone while CARLA's traffic manager drove "
+                    "cars there, wanted the same one: start it again, and type this again; what is done is kept"
+                )
             connection = Connection(self._host, self._port)
         self._connection = connection
         connection.synchronise()

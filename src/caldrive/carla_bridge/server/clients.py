@@ -6,7 +6,8 @@ import selectors
 import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -72,16 +73,12 @@ class Clients:
 
     def _attend(self, client: Client, events: int) -> None:
         """Reads what a client asks for, and sends what it has to get."""
-        try:
+        with self._while_it_lasts(client):
             if events & selectors.EVENT_WRITE:
                 client.outbox.flush()
             if events & selectors.EVENT_READ:
                 self._hear(client)
             self._watch(client)
-        except Gone:
-            self._let_go(client)
-        except BrokenMessage as error:
-            self._cut_off(client, error)
 
     def _hear(self, client: Client) -> None:
         try:
@@ -109,15 +106,11 @@ class Clients:
     def _answer(self, client: Client) -> None:
         """Answers a client's next call."""
         request = client.asked.popleft()
-        try:
+        with self._while_it_lasts(client):
             client.outbox.put([answer(request.id, self._serve(client.number, request))])
             if client.outbox.waiting > MOST_UNREAD:
                 raise BrokenMessage("it does not read its answers")
             self._watch(client)
-        except Gone:
-            self._let_go(client)
-        except BrokenMessage as error:
-            self._cut_off(client, error)
 
     def _watch(self, client: Client) -> None:
         """Waits for room in a socket as long as something has to be sent."""
@@ -125,9 +118,16 @@ class Clients:
         if self._selector.get_key(client.socket).events != selectors.EVENT_READ | writes:
             self._selector.modify(client.socket, selectors.EVENT_READ | writes, client)
 
-    def _cut_off(self, client: Client, error: BrokenMessage) -> None:
-        self._log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
-        self._let_go(client)
+    @contextmanager
+    def _while_it_lasts(self, client: Client) -> Iterator[None]:
+        """Lets a client go that has gone, or sends what is no message."""
+        try:
+            yield
+        except Gone:
+            self._let_go(client)
+        except BrokenMessage as error:
+            self._log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
+            self._let_go(client)
 
     def _let_go(self, client: Client) -> None:
         self._selector.unregister(client.socket)

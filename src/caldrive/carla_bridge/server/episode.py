@@ -95,7 +95,7 @@ class Episode:
 
     def has_room(self, box: VehicleState) -> bool:
         """Whether a new body fits there."""
-        return is_free(box, self.bodies(), self._props(), self.town.obstacles)
+        return is_free(box, self.bodies(), self.props(), self.town.obstacles)
 
     def actor_of(self, name: str) -> Actor | None:
         """The actor behind the id of a car or a person, None for what stands in the town."""
@@ -116,7 +116,7 @@ class Episode:
         self._population.move_to(self.time, self._vehicle_states(), self._walker_states())
         self._take_down()
         there = [one for one in vehicles if is_on_ground(one.place)]
-        self.hits = resolve_contacts(there, self.bodies(), self._props(), self.town.obstacles)
+        self.hits = resolve_contacts(there, self.bodies(), self.props(), self.town.obstacles)
         for vehicle, state in zip(vehicles, before, strict=True):
             vehicle.note_motion(state, delta)
         if self._steps % LOOK_AT_LIMITS == 1:
@@ -149,12 +149,8 @@ class Episode:
             box = PERSON_BOX
             if isinstance(body, VehicleState):
                 box = box_of((body.length, body.width, NATIVE_HEIGHT), NATIVE_HEIGHT / 2)
-            actor = Actor(
-                next(self._numbers),
-                description(kind, **usual_attributes(kind) | {"role_name": "autopilot"}),
-                Placement(),
-                box=box,
-            )
+            about = description(kind, **usual_attributes(kind) | {"role_name": "autopilot"})
+            actor = Actor(next(self._numbers), about, Placement(), box=box)
             self._natives[body.id] = self._actors[actor.id] = actor
         actor = self._natives[body.id]
         c, s = math.cos(body.pose.heading), math.sin(body.pose.heading)
@@ -171,7 +167,8 @@ class Episode:
     def _vehicle_states(self, but: int = 0) -> list[VehicleState]:
         return [one.box_state() for one in self.all(Vehicle) if one.id != but and is_on_ground(one.place)]
 
-    def _props(self) -> list[Prop]:
+    def props(self) -> list[Prop]:
+        """Things that clients put somewhere where they are met."""
         return [one for one in self.all(Prop) if is_on_ground(one.place)]
 
     def bodies(self) -> list[VehicleState | PedestrianState]:

@@ -71,15 +71,6 @@ def semantic_scan(
 ) -> SemanticScan:
     """What a lidar finds while it turns on; no point is lost. The views of `rays` also hold classes and cosines."""
     azimuths, elevations, count = directions(lidar, angle, rays.delta)
-    if not count:
-        nothing = np.zeros(0)
-        return SemanticScan(
-            np.zeros(len(lidar.elevations), int),
-            np.zeros((0, 3)),
-            nothing,
-            nothing.astype(np.uint8),
-            nothing.astype(int),
-        )
     found = cast(place, azimuths, elevations, rays.views)
     keep = np.linalg.norm(found[:, :3], axis=1) < lidar.range
     points, classes = found[keep, :3], found[keep, 3].astype(np.uint8)

@@ -8,7 +8,7 @@ from typing import Any
 
 from caldrive.carla_bridge.axes import Placement, to_carla
 from caldrive.carla_bridge.server import wire
-from caldrive.carla_bridge.server.actors import Label, Prop, description
+from caldrive.carla_bridge.server.actors import Label, description
 from caldrive.carla_bridge.server.contacts import prop_box, way_ahead
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import BoundingBox
@@ -70,7 +70,7 @@ def obstacle(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Me
     bodies: Sequence[Any] = (*scene.vehicles, *scene.pedestrians)
     near = [obstacle_of(one) for one in bodies if (actor := episode.actor_of(one.id)) and actor.id != own]
     if asked.get("only_dynamics", "false").lower() != "true":
-        near += [*episode.town.obstacles.near(place.pose, reach + radius), *map(prop_box, episode.all(Prop))]
+        near += [*episode.town.obstacles.near(place.pose, reach + radius), *map(prop_box, episode.props())]
     found = way_ahead(place.pose, reach, radius, near)
     if found is not None:
         mine = (sensor.parent or sensor).layout(b"")

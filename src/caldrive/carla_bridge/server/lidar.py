@@ -125,7 +125,7 @@ def cast(place: Placement, azimuths: Array, elevations: Array, views: Views) -> 
     focal = 1 / PIXEL
     size = math.ceil(2 * math.tan(SECTOR / 2) * focal), 2 * math.ceil(steepest * focal) + 2
     sectors = np.round(azimuths / SECTOR).astype(int)
-    for k in np.unique(sectors).tolist():
+    for k in np.unique(sectors).tolist() or [0]:  # without a ray there is still a picture, and so its layers
         here, turned = sectors == k, k * SECTOR
         view = compose(place, Placement(heading=turned))
         camera = PinholeCamera(
@@ -134,7 +134,7 @@ def cast(place: Placement, azimuths: Array, elevations: Array, views: Views) -> 
         c, s = math.cos(turned), math.sin(turned)
         x, y, z, *others = _ends(camera, azimuths[here] - turned, elevations[here], views(camera))
         found.append((here, np.column_stack((c * x - s * y, s * x + c * y, z, *others))))
-    ends = np.empty((len(azimuths), found[0][1].shape[1] if found else 3))
+    ends = np.empty((len(azimuths), found[0][1].shape[1]))
     for here, values in found:
         ends[here] = values
     return ends
