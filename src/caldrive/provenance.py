@@ -12,7 +12,7 @@ import os
 import platform
 from pathlib import Path
 
-BEHAVIOUR_VERSION = 6
+BEHAVIOUR_VERSION = 7
 
 
 def code_version() -> str:

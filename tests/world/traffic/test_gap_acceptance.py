@@ -18,7 +18,7 @@ def may(
     car: VehicleState, x: float, y: float, dx: float, dy: float, *, bold: bool = False, curvature: float = 0.0
 ) -> bool:
     """Whether somebody at (x, y) may walk (dx, dy)."""
-    return bool(may_walk(np.array((x, y)), (dx, dy), 1.2, Cars(boxes_of([car]), curvature), bold))
+    return bool(may_walk(np.array((x, y)), (dx, dy), 1.2, Cars(boxes_of([car]), curvature, curvature), bold))
 
 
 def car(speed: float, heading: float = 0.0) -> VehicleState:
@@ -130,7 +130,7 @@ def test_people_look_along_the_path_of_an_ego_that_turns(side: int) -> None:
     near, nearer = beside(0.6, 1.4), beside(0.6, 1.3)
     step = (nearer[0] - near[0], nearer[1] - near[1])
     assert not bumps(np.array(near), step, Cars(boxes_of([car(4.0)])))
-    assert bumps(np.array(near), step, Cars(boxes_of([car(4.0)]), side * TURN))
+    assert bumps(np.array(near), step, Cars(boxes_of([car(4.0)]), side * TURN, side * TURN))
 
 
 @pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
@@ -145,7 +145,7 @@ def test_an_ego_that_turns_touches_nobody_who_comes_to_its_side(side: int, comin
     for _ in range(40):
         ego = advance(ego, control, 0.05, car)
         here = VehicleState(ego.pose, ego.speed, length=car.length, width=car.width)
-        if not bumps(person, tuple(step.tolist()), Cars(boxes_of([here]), side / 7)):
+        if not bumps(person, tuple(step.tolist()), Cars(boxes_of([here]), side / 7, side / 7)):
             person = person + step
         body = shapely.Polygon(box_corners(ego.pose, car.length, car.width))
         clear = min(clear, body.distance(shapely.Point(person)))
@@ -162,7 +162,19 @@ def test_nobody_is_bold_before_an_ego_that_turns() -> None:
     assert may(car(5.5), 2.1 + 8.0, -2.06, 0.0, 0.2, bold=True)  # before one that drives straight on
 
 
-@pytest.mark.parametrize("curvature", [0.1, -0.1, 0.02])
+@pytest.mark.parametrize("speed", [0.0, 1.0, 4.0])
+@pytest.mark.parametrize(
+    ("path", "place"), [((-0.15, -0.08), (5.0, -4.3)), ((0.0, -0.12), (3.0, -3.9))], ids=["turns", "begins to turn"]
+)
+def test_nobody_enters_the_path_of_an_ego_that_turns_and_may_drive_on(
+    speed: float, path: tuple[float, float], place: tuple[float, float]
+) -> None:
+    """Its hazard area is straight, and sees them when they are 1.5 m before it."""
+    assert not may_walk(np.array(place), (0.0, 0.3), 1.2, Cars(boxes_of([car(speed)]), *path), False)
+    assert may_walk(np.array(place), (0.0, 0.3), 1.2, Cars(boxes_of([car(speed)])), False)
+
+
+@pytest.mark.parametrize("curvature", [0.045, -0.045, 0.02])
 def test_a_curved_path_is_as_long_as_it_is(curvature: float) -> None:
     """Who steps on a path may do so the same way ahead of the car on straight and curved ones."""
 

@@ -1,6 +1,7 @@
 """When people step in front of cars. The careful accept a gap in which a driver who keeps to the limit can still stop
 for them, or has passed, or is slow; in front of a fast car they wait. The bold misjudge the ego: they step out in front
 of it as soon as a driver who brakes at once can just stop. So who looks can always avoid them, and who does not cannot.
+Before an ego that turns nobody is bold, and in a tight turn, where it looks past its path, nobody enters that at all.
 """
 
 from __future__ import annotations
@@ -27,9 +28,13 @@ REACTION, HARD_BRAKE, SPARE = 0.3, 6.5, 0.8
 EGO = 0  # its row among the boxes
 BODY, TOUCH = 1.35, 0.45  # m: half of a car and of a person beside it, and from its ends, with some room
 FULL_BRAKE, LEFT_OVER = 7.0, 0.3  # m/s² of a driver who brakes already, and m that remain
+DRIFT = 0.3  # m by which who stands beside a car's path may come to lie in it, as that changes
 REAR = 0.6  # halves of a car's length from its middle back to its rear axle
 STRAIGHT = 0.02  # 1/m: less curved paths are as good as straight
+CROSSES = 2.0  # s that somebody takes to leave the way of a car
+TIGHT = 0.05  # 1/m: on a path that curves so much a driver who looks straight ahead sees nobody early enough
 STEPS_OVER = 0.4  # m from one look along a way to the next
+MEMORY, FORESIGHT = 0.5, 1.0  # s: from how the ego's path bent lately people see how it will
 Floats = NDArray[np.float64]
 
 
@@ -40,33 +45,29 @@ class Cars(NamedTuple):
     """(M, 5), see `geometry.boxes_of`; the ego first."""
     curvature: float = 0.0
     """1/m of the ego's path as its wheels stand, + to the left."""
+    soon: float = 0.0
+    """Likewise as they will stand in a moment."""
+
+
+def watched(lately: float, curvature: float, dt: float) -> float:
+    """The curvature (1/m) that the ego's path has had lately, dt seconds later."""
+    return lately + (curvature - lately) * min(dt / MEMORY, 1.0)
+
+
+def foreseen(lately: float, curvature: float) -> tuple[float, float]:
+    """The curvature (1/m) of the ego's path, and that which people expect in a moment if it goes on turning so."""
+    return curvature, curvature + (curvature - lately) * FORESIGHT / MEMORY
 
 
 @compiled
 def may_walk(position: Points, way: tuple[float, float], pace: float, cars: Cars, is_bold: bool) -> bool:
     """Whether somebody (2,) may walk a stretch (x, y in m) at a pace (m/s): who enters no corridor of a car that by
-    then is beside them or can neither stop nor pass. is_bold: in front of the ego, unless it turns, as it then sees
-    them late."""
-    bold_before_ego = is_bold and abs(cars.curvature) < STRAIGHT
-    for car in range(len(cars.boxes)):
-        curvature = cars.curvature if car == EGO else 0.0
-        speed, half = cars.boxes[car, 3], cars.boxes[car, 4]
-        ahead, left = _before(cars.boxes[car], position[0], position[1], curvature)
-        farther, then_left = _before(cars.boxes[car], position[0] + way[0], position[1] + way[1], curvature)
-        sideways = then_left - left  # how far the stretch goes across the car's corridor
-        if abs(sideways) <= STANDS_STILL or left * sideways >= 0:
-            continue
-        share = (abs(left) - CORRIDOR) / abs(sideways)
-        if 0 < share <= 1:
-            arrives = share * math.hypot(way[0], way[1]) / pace
-            then = ahead + share * (farther - ahead) - speed * arrives
-            if then <= -2 * half - PASSED:
-                continue
-            if bold_before_ego and car == EGO:
-                if _cannot_stop_at_once(then, speed, 2 * CORRIDOR / pace):
-                    return False
-            elif _cannot_stop(then, arrives, speed, 2 * CORRIDOR / pace):
-                return False
+    then is beside them or can neither stop nor pass. is_bold: in front of the ego, unless it turns."""
+    for look in range(_looks(cars)):
+        car, curvature = _looked_at(cars, look)
+        is_bold_now = is_bold and car == EGO and abs(curvature) < STRAIGHT
+        if _is_too_near(position, way, pace, cars.boxes[car], curvature, is_bold_now):
+            return False
     return True
 
 
@@ -74,17 +75,9 @@ def may_walk(position: Points, way: tuple[float, float], pace: float, cars: Cars
 def bumps(position: Points, step: tuple[float, float], cars: Cars) -> bool:
     """Whether a step (x, y in m) leads somebody (2,) into a car, or in front of one that would reach them even if it
     braked fully: a car that turns may come to be before people who have entered no corridor, and beside them."""
-    for car in range(len(cars.boxes)):
-        curvature = cars.curvature if car == EGO else 0.0
-        speed, half = cars.boxes[car, 3], cars.boxes[car, 4]
-        ahead, left = _before(cars.boxes[car], position[0], position[1], curvature)
-        then_ahead, then_left = _before(cars.boxes[car], position[0] + step[0], position[1] + step[1], curvature)
-        reach = TOUCH
-        if speed > MOVING:
-            reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
-        is_near = -2 * half - TOUCH < ahead < reach and abs(left) < _body(left, half, curvature)
-        will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < _body(then_left, half, curvature)
-        if will_be and (not is_near or (ahead < TOUCH and abs(then_left) < abs(left))):
+    for look in range(_looks(cars)):
+        car, curvature = _looked_at(cars, look)
+        if _is_bumped(position, step, cars.boxes[car], curvature):
             return True
     return False
 
@@ -103,6 +96,61 @@ def is_clear(position: Points, end: Points, cars: Cars) -> bool:
             if -2 * cars.boxes[car, 4] - 2 * TOUCH < ahead < 2 * TOUCH and abs(left) < BODY:
                 return False
     return True
+
+
+@inlined
+def _looks(cars: Cars) -> int:
+    """How often somebody looks: at each car, and at the ego once more if its path changes."""
+    return len(cars.boxes) + int(len(cars.boxes) > 0 and cars.soon != cars.curvature)
+
+
+@inlined
+def _looked_at(cars: Cars, look: int) -> tuple[int, float]:
+    """Which car somebody looks at, and the curvature of its path, 1/m."""
+    if look == len(cars.boxes):
+        return EGO, cars.soon
+    return look, cars.curvature if look == EGO else 0.0
+
+
+@inlined
+def _is_too_near(
+    position: Points, way: tuple[float, float], pace: float, box: Floats, curvature: float, is_bold: bool
+) -> bool:
+    """Whether a stretch leads into the corridor of a car on such a path that can neither stop nor pass. is_bold: who
+    trusts that it brakes at once."""
+    speed, half = box[3], box[4]
+    ahead, left = _before(box, position[0], position[1], curvature)
+    farther, then_left = _before(box, position[0] + way[0], position[1] + way[1], curvature)
+    sideways = then_left - left  # how far the stretch goes across the car's corridor
+    if abs(sideways) <= STANDS_STILL or left * sideways >= 0:
+        return False
+    share = (abs(left) - CORRIDOR) / abs(sideways)
+    if not 0 < share <= 1:
+        return False
+    arrives, taken = share * math.hypot(way[0], way[1]) / pace, 2 * CORRIDOR / pace
+    then = ahead + share * (farther - ahead) - speed * arrives
+    if then <= -2 * half - PASSED:
+        return False
+    if is_bold:
+        return _cannot_stop_at_once(then, speed, taken)
+    is_unseen = abs(curvature) >= TIGHT and then < speed * taken + MAY_GAIN * taken * taken / 2
+    return bool(is_unseen or _cannot_stop(then, arrives, speed, taken))
+
+
+@inlined
+def _is_bumped(position: Points, step: tuple[float, float], box: Floats, curvature: float) -> bool:
+    """Whether a step leads into a car on such a path, or in front of it where it cannot stop any more."""
+    speed, half = box[3], box[4]
+    ahead, left = _before(box, position[0], position[1], curvature)
+    then_ahead, then_left = _before(box, position[0] + step[0], position[1] + step[1], curvature)
+    reach = TOUCH
+    if speed > MOVING:
+        reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
+    if abs(curvature) >= TIGHT:
+        reach = max(reach, speed * CROSSES + MAY_GAIN * CROSSES * CROSSES / 2)
+    is_near = -2 * half - TOUCH < ahead < reach and abs(left) < _body(left, half, curvature) - DRIFT
+    will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < _body(then_left, half, curvature)
+    return bool(will_be and (not is_near or (ahead < TOUCH and abs(then_left) < abs(left))))
 
 
 @inlined

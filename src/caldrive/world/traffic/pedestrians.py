@@ -19,7 +19,7 @@ from caldrive.compiled import compiled, inlined
 from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
 from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
-from caldrive.world.traffic.gap_acceptance import Cars, bumps, is_clear, may_walk
+from caldrive.world.traffic.gap_acceptance import Cars, bumps, foreseen, is_clear, may_walk, watched
 from caldrive.world.traffic.sidewalks import Crossing, Floats, Loops, find_sidewalks, require_room
 
 MEAN_WALK_BETWEEN_CROSSINGS = 16.0  # s
@@ -103,12 +103,14 @@ class Pedestrians:
         self.crossing: list[Crossing | None] = [None] * n
         self._screened = [_screened(ways, screens) for ways in self.sidewalks.crossings] if n else []
         self._cars = Cars(boxes_of(()))
+        self._path = 0.0  # 1/m: the curvature of the ego's path lately
         self._hiding: set[int] = set()  # those who look for something to come from behind
         walk_on(self.walkers, self.sidewalks.loops, np.arange(n), dt=0.0)
 
     def step(self, dt: float, cars: Sequence[VehicleState], curvature: float = 0.0) -> None:
         """Everybody walks on for dt seconds. cars: the ego first; curvature: of its path, 1/m."""
-        self._cars = Cars(boxes_of(cars), curvature)
+        self._cars = Cars(boxes_of(cars), *foreseen(self._path, curvature))
+        self._path = watched(self._path, curvature, dt)
         starts = self.rng.random(self.n) < self.rate * dt
         crossing = np.array([way is not None for way in self.crossing], dtype=bool)
         who = np.flatnonzero(crossing)

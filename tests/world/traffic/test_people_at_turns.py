@@ -1,0 +1,80 @@
+"""People around an ego that turns: it brakes for whom its hazard area shows, which is straight, and touches nobody."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from caldrive.datatypes import Control, PedestrianState, Pose, VehicleState
+from caldrive.geometry import box_corners, boxes_of, moved
+from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
+from caldrive.world.traffic.gap_acceptance import Cars, bumps, foreseen, may_walk, watched
+from caldrive.world.truth.labels import A2
+
+CAR, DT = VehicleConfig(), 0.1
+RADIUS = PedestrianState(Pose(0, 0, 0), 0).radius
+STRAIGHT_ON, WALKS = 10.0, 14.0  # m before the turn, and s that everybody goes on
+Place = tuple[float, float]
+
+
+def path_of(bend: float) -> shapely.LineString:
+    """Straight on, a turn by 90° (1/m, + to the left), and straight on again."""
+    angles, side = np.linspace(0, math.pi / 2, 40), math.copysign(1.0, bend)
+    turn = [(-2 + math.sin(angle) / abs(bend), (1 - math.cos(angle)) / bend) for angle in angles.tolist()]
+    return shapely.LineString([(-12.0, 0.0), *turn, (turn[-1][0], turn[-1][1] + 12 * side)])
+
+
+def drives(ego: EgoState, driven: float, bend: float, person: Place) -> EgoState:
+    """The ego 0.1 s later, at 20 km/h on straights and at 14 in the turn."""
+    length = math.pi / 2 / abs(bend)
+    steer = math.atan(bend * CAR.wheelbase) / CAR.max_steer if 0 <= driven - STRAIGHT_ON < length else 0.0
+    if A2.among(moved(ego.pose, forward=CAR.front_axle), [PedestrianState(Pose(*person, 0.0), 1.0)]):
+        return advance(ego, Control(brake=1.0, steer=steer), DT, CAR)
+    missing = (4.0 if 4 < driven < STRAIGHT_ON + length - 2 else 5.5) - ego.speed
+    throttle, brake = min(max(missing / 2 + 0.15, 0.0), 1.0), min(max(-0.3 * missing, 0.0), 1.0)
+    return advance(ego, Control(throttle, brake, steer), DT, CAR)
+
+
+def nearest(person: Place, step: Place, bend: float, waits: float) -> float:
+    """m between a moving ego and somebody who takes such steps from some second on; the least."""
+    ego, driven, lately, least = EgoState(Pose(-12, 0, 0), speed=5.0), 0.0, 0.0, math.inf
+    for k in range(round(WALKS / DT)):
+        ego = drives(ego, driven, bend, person)
+        curvature, driven = math.tan(ego.steer_angle) / CAR.wheelbase, driven + ego.speed * DT
+        here = VehicleState(ego.pose, ego.speed, length=CAR.length, width=CAR.width)
+        cars, place = Cars(boxes_of([here]), *foreseen(lately, curvature)), np.array(person)
+        lately = watched(lately, curvature, DT)
+        goes = k * DT >= waits and may_walk(place, step, math.hypot(*step) / DT, cars, False)
+        if goes and not bumps(place, step, cars):
+            person = (person[0] + step[0], person[1] + step[1])
+        if ego.speed > 0.05:
+            body = shapely.Polygon(box_corners(ego.pose, CAR.length, CAR.width))
+            least = min(least, body.distance(shapely.Point(person)))
+    return least
+
+
+@pytest.mark.parametrize(
+    ("bend", "person", "degrees", "pace", "waits"),
+    [
+        (1 / 9, (3.44, 6.79), 290, 1.57, 1.6),
+        (1 / 9, (3.18, 8.69), 293, 1.55, 0.6),
+    ],
+)
+def test_who_walked_into_a_turning_ego_waits(
+    bend: float, person: Place, degrees: float, pace: float, waits: float
+) -> None:
+    way = math.radians(degrees)
+    assert nearest(person, (math.cos(way) * pace * DT, math.sin(way) * pace * DT), bend, waits) > RADIUS
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_an_attentive_ego_that_turns_touches_nobody_who_comes_from_anywhere(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    bend, way, pace = float(rng.choice([-1 / 7, 1 / 9])), rng.uniform(0, math.tau), rng.uniform(0.9, 1.6)
+    person = (rng.uniform(0, 16), rng.uniform(-6, 14) * math.copysign(1.0, bend))
+    if path_of(bend).distance(shapely.Point(person)) > 2.6:  # nobody stands on it in the beginning
+        step = (math.cos(way) * pace * DT, math.sin(way) * pace * DT)
+        assert nearest(person, step, bend, rng.uniform(0, 6)) > RADIUS
