@@ -37,6 +37,7 @@ def streams(said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Stream
 def reader(streams: Streams) -> Iterator[socket.socket]:
     with socket.create_connection(("127.0.0.1", streams.port)) as made:
         streams.announce(STREAM)
+        streams.token(STREAM)
         made.send(struct.pack("<I", STREAM))
         streams.settle()
         yield made
@@ -87,6 +88,20 @@ def test_whoever_reads_all_that_waited_gets_messages_again(
     streams.send(STREAM, [b"news"])
     assert reader.recv(100)[4:] == b"news"
     assert len(said) == 1
+
+
+@pytest.mark.parametrize("was_there", [False, True], ids=["never there", "ended"])
+def test_who_wants_a_stream_that_is_not_there_is_sent_away(streams: Streams, was_there: bool) -> None:
+    """Or it would wait for ever, and count among the subscribers."""
+    if was_there:
+        streams.token(STREAM)
+        streams.close_stream(STREAM)
+    with socket.create_connection(("127.0.0.1", streams.port)) as late:
+        late.send(struct.pack("<I", STREAM))
+        late.settimeout(5.0)
+        for _ in range(3):
+            streams.poll(0.05)
+        assert late.recv(100) == b""
 
 
 @pytest.mark.parametrize("words", [bytes(5), struct.pack("<II", 5, 5)])

@@ -8,9 +8,10 @@ from typing import Any, TypeVar
 
 from caldrive.carla_bridge.axes import Placement, compose
 from caldrive.carla_bridge.server.actors import Actor, ActorLayout, Prop, box_of
-from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, REFUSED, SIZES
+from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, REFUSED, SIZES, VOLUME
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.episode import PERSON_BOX, is_on_ground
+from caldrive.carla_bridge.server.friction import volume
 from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox, Transform, Vector, placement
 from caldrive.carla_bridge.server.sensor_actors import SensorActor, checked
 from caldrive.carla_bridge.server.server import Server
@@ -106,6 +107,8 @@ class ActorCalls:
         if kind.startswith("walker."):
             self._require_room(world, 2 * RADIUS, 2 * RADIUS)
             return Walker(0, asked, Placement(world.x, world.y, UP, world.heading), box=PERSON_BOX, before=world.pose)
+        if kind == VOLUME:
+            return volume(asked, at)
         length, width, height = SIZES[kind]
         if kind.startswith("vehicle."):
             self._require_room(world, length, width)
@@ -185,7 +188,10 @@ class ActorCalls:
 
     @call("set_actor_enable_gravity")
     def enable_gravity(self, caller: int, number: int, is_on: bool) -> None:
-        """Everything stands on the ground."""
+        """Everything stays on the ground; but without gravity the tyres of a vehicle do not hold."""
+        actor = self._server.episode.get(number)
+        if isinstance(actor, Vehicle):
+            actor.has_gravity = is_on
 
     @call("set_actor_dead")
     def set_dead(self, caller: int, number: int) -> None:

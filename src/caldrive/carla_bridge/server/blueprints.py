@@ -79,6 +79,7 @@ PROPS = (
 )  # fmt: skip
 CAMERAS = ("rgb", "depth", "semantic_segmentation", "instance_segmentation")
 NOT_DRAWN = ("dvs", "optical_flow", "normals")
+VOLUME = "static.trigger.friction"
 REFUSED = (*(f"sensor.camera.{kind}" for kind in NOT_DRAWN), "sensor.other.rss")
 _LENS = {
     "lens_circle_falloff": "5.0", "lens_circle_multiplier": "0.0", "lens_k": "-1.0", "lens_kcube": "0.0",
@@ -195,6 +196,7 @@ def _all() -> dict[str, list[Attribute]]:
     found |= {f"sensor.camera.{kind}": _camera(kind) for kind in (*CAMERAS, *NOT_DRAWN)}
     found |= {id: _sensor(id) for id in _SENSORS}
     found |= {id: _names("prop") for id, *_ in PROPS}
+    found[VOLUME] = [*_names("trigger"), *_floats({"friction": "3.5", **{f"extent_{axis}": "100.0" for axis in "xyz"}})]
     return found
 
 

@@ -13,6 +13,7 @@ from caldrive.carla_bridge.server import snapshot
 from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description
 from caldrive.carla_bridge.server.blueprints import N_WALKERS, usual_attributes
 from caldrive.carla_bridge.server.contacts import Hit, is_free, resolve_contacts
+from caldrive.carla_bridge.server.friction import FrictionVolume, friction_at
 from caldrive.carla_bridge.server.layouts import BoundingBox, Vector, VehicleControl
 from caldrive.carla_bridge.server.layouts import Weather as CarlaWeather
 from caldrive.carla_bridge.server.lights import NUMBERS, Light, LightKeeper, light_actors
@@ -108,8 +109,9 @@ class Episode:
         """Moves everything on by delta seconds."""
         self.delta, self.time, self._steps = delta, self.time + delta, self._steps + 1
         vehicles, walkers = self.all(Vehicle), self.all(Walker)
-        before = [vehicle.state for vehicle in vehicles]
+        before, volumes = [vehicle.state for vehicle in vehicles], self.all(FrictionVolume)
         for vehicle in vehicles:
+            vehicle.friction_here = friction_at(vehicle.place, volumes)
             vehicle.step(delta)
         for walker in walkers:
             walker.step(delta)

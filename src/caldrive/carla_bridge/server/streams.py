@@ -63,6 +63,7 @@ class Streams:
         self._subscribers: set[Subscriber] = set()
         self._by_stream: dict[int, list[Subscriber]] = {}
         self._announced: Counter[int] = Counter()
+        self._open: set[int] = set()  # those that somebody has a token of
         self._slow: dict[Subscriber, tuple[int, float]] = {}  # bytes that they are behind, and since when (s)
 
     def fileno(self) -> int:
@@ -71,6 +72,7 @@ class Streams:
 
     def token(self, stream: int) -> bytes:
         """What a client needs to subscribe."""
+        self._open.add(stream)
         return TOKEN.pack(stream, self.port, TCP, SAME_HOST)
 
     def announce(self, stream: int) -> None:
@@ -107,6 +109,7 @@ class Streams:
 
     def close_stream(self, stream: int) -> None:
         """Ends a stream."""
+        self._open.discard(stream)
         for subscriber in self._by_stream.pop(stream, []):
             self._drop(subscriber)
 
@@ -147,6 +150,9 @@ class Streams:
             self._selector.register(connection, selectors.EVENT_READ, subscriber)
 
     def _subscribe(self, subscriber: Subscriber, stream: int) -> None:
+        """Raises Gone where there is no such stream, or no longer: nothing would ever come."""
+        if stream not in self._open:
+            raise Gone
         self._by_stream.setdefault(stream, []).append(subscriber)
         self._announced[stream] -= 1
         if self._announced[stream] <= 0:

@@ -76,7 +76,7 @@ class VehicleCalls:
 
     @call("apply_physics_control")
     def set_physics(self, caller: int, number: int, physics: PhysicsControl) -> None:
-        """The mass and the steering count; the rest is read back."""
+        """Mass, friction, drag and steering count; the rest is read back."""
         set_physics(self._vehicle(number), physics)
 
     @call("get_vehicle_light_state")

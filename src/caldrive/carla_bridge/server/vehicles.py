@@ -9,6 +9,7 @@ import msgspec
 
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server.actors import STILL, Actor
+from caldrive.carla_bridge.server.friction import gripping, require_friction
 from caldrive.carla_bridge.server.layouts import (
     AckermannControl,
     AckermannSettings,
@@ -46,6 +47,10 @@ class Vehicle(Actor):
     lights: int = 0
     limit: float = 30.0
     """km/h, the lawful one where it is."""
+    has_gravity: bool = True
+    """Whether its tyres are on the ground."""
+    friction_here: float | None = None
+    """That of its tyres in the volume that it is in, if any."""
     pushed: float = 0.0
     """N along its heading, for one step."""
 
@@ -74,7 +79,8 @@ class Vehicle(Actor):
             return
         if self.ackermann is not None:
             self.control = by_ackermann(self.ackermann, before, self.config)
-        self.state = drive(before, self.control, dt, self.config)
+        here = self.friction_here if self.has_gravity else 0.0
+        self.state = drive(before, self.control, dt, gripping(self.config, self.physics, here))
         speed = self.state.speed + self.pushed / self.physics.mass * dt
         self.pushed = 0.0
         if self.description.get("sticky_control", "true").lower() == "false":
@@ -170,12 +176,15 @@ def physics_of(vehicle: Vehicle) -> PhysicsControl:
         steers = math.degrees(config.max_steer) if k < 2 else 0.0
         wheel = vehicle.physics.wheels[k] if k < len(vehicle.physics.wheels) else Wheel()
         position = Vector(x * CM, y * CM, z * CM)
-        wheels.append(msgspec.structs.replace(wheel, max_steer_angle=steers, position=position))
+        friction = wheel.tire_friction if vehicle.friction_here is None else vehicle.friction_here
+        wheels.append(msgspec.structs.replace(wheel, tire_friction=friction, max_steer_angle=steers, position=position))
     return msgspec.structs.replace(vehicle.physics, wheels=tuple(wheels))
 
 
 def set_physics(vehicle: Vehicle, physics: PhysicsControl) -> None:
-    """Takes over what the bicycle model has: the mass, and how far the front wheels turn."""
+    """Takes over what the bicycle model has: the mass, the grip and the drag, and how far the front wheels turn.
+    Raises Refusal where one of them cannot be."""
+    require_friction(physics)
     angles = [wheel.max_steer_angle for wheel in physics.wheels[:2]]
     if angles and 1.0 <= max(angles) <= 80.0:
         vehicle.config = replace(vehicle.config, max_steer=math.radians(max(angles)))
