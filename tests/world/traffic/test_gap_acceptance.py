@@ -113,6 +113,15 @@ def test_nobody_steps_before_a_car_that_cannot_stop_any_more_and_who_is_there_go
     assert not bumps(there, (0.0, 0.14), cars)
 
 
+@pytest.mark.parametrize("speed", [0.0, 4.0])
+@pytest.mark.parametrize("left", [-1.2, -0.3])
+def test_whoever_is_before_a_car_may_leave(speed: float, left: float) -> None:
+    """Or they and a car that waits for them would stand for ever."""
+    cars, place = Cars(boxes_of([car(speed)])), np.array((2.1 + 0.3, left))
+    assert not bumps(place, (0.0, -0.14), cars)
+    assert bumps(place, (0.0, 0.14), cars)
+
+
 TURN = 1 / 8.0  # 1/m
 REAR_AXLE = 0.6 * 2.1  # m behind a car's middle
 

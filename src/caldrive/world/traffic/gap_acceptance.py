@@ -17,7 +17,7 @@ from caldrive.datatypes import Points
 
 CORRIDOR = 2.05  # m to either side of a car's middle
 STOPPABLE_SPEED = 9.2  # m/s: from it a full brake stops within the hazard area A2
-SEEN_FROM = 8.0  # m ahead of a car's front within which it may begin to brake for them
+SEEN_FROM, SEEN_ASIDE = 8.0, 1.9  # m ahead of a car's front and aside within which it may begin to brake for them
 MAY_GAIN = 3.0  # m/s² by which a moving car may speed up
 MOVING = 0.3  # m/s from which on a car moves
 STANDING_GAP = 0.8  # m ahead of a standing car within which nobody walks
@@ -133,8 +133,8 @@ def _is_too_near(
         return False
     if is_bold:
         return _cannot_stop_at_once(then, speed, taken)
-    is_unseen = abs(curvature) >= TIGHT and then < speed * taken + MAY_GAIN * taken * taken / 2
-    return bool(is_unseen or _cannot_stop(then, arrives, speed, taken))
+    is_surprised = _is_unseen(position, box, curvature) and then < speed * taken + MAY_GAIN * taken * taken / 2
+    return bool(is_surprised or _cannot_stop(then, arrives, speed, taken))
 
 
 @inlined
@@ -144,13 +144,22 @@ def _is_bumped(position: Points, step: tuple[float, float], box: Floats, curvatu
     ahead, left = _before(box, position[0], position[1], curvature)
     then_ahead, then_left = _before(box, position[0] + step[0], position[1] + step[1], curvature)
     reach = TOUCH
-    if speed > MOVING:
+    if speed > MOVING and _is_unseen(position, box, curvature):
+        reach = speed * CROSSES + MAY_GAIN * CROSSES * CROSSES / 2
+    elif speed > MOVING:
         reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
-    if abs(curvature) >= TIGHT:
-        reach = max(reach, speed * CROSSES + MAY_GAIN * CROSSES * CROSSES / 2)
-    is_near = -2 * half - TOUCH < ahead < reach and abs(left) < _body(left, half, curvature) - DRIFT
+    body = _body(left, half, curvature)
+    is_near = -2 * half - TOUCH < ahead < reach and abs(left) < body
     will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < _body(then_left, half, curvature)
-    return bool(will_be and (not is_near or (ahead < TOUCH and abs(then_left) < abs(left))))
+    still_beside = ahead < TOUCH or abs(left) > body - DRIFT
+    return bool(will_be and (not is_near or (still_beside and abs(then_left) < abs(left))))
+
+
+@inlined
+def _is_unseen(position: Points, box: Floats, curvature: float) -> bool:
+    """Whether somebody is in no place where the driver of a car in a tight turn looks, straight ahead."""
+    ahead, left = _before(box, position[0], position[1], 0.0)
+    return bool(abs(curvature) >= TIGHT and not (0 < ahead < SEEN_FROM and abs(left) < SEEN_ASIDE))
 
 
 @inlined
