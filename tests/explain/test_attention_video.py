@@ -12,11 +12,11 @@ import torch
 from PIL import Image as Picture
 
 from caldrive.datatypes import Command, Observation
+from caldrive.explain.activation_maps import Question
 from caldrive.explain.attention_video import PANEL_WIDTH, LiveAttention, Scene, look, panels
-from caldrive.explain.gradcam import Question
 from caldrive.perception.network.network import Network
 from tests.command_line import run_json
-from tests.explain.test_gradcam import CONFIG, pictures
+from tests.explain.test_activation_maps import CONFIG, pictures
 
 
 def frames_of(path: Path) -> list[np.ndarray]:
@@ -31,10 +31,10 @@ def test_each_scene_has_the_ones_before_it_as_its_history() -> None:
     def scenes() -> Iterator[Scene]:
         yield from (Scene(image, Command.LEFT, 0.5) for image in images)
 
-    looked = list(look(network, scenes(), [Question("hazard_stop"), Question("relative_angle")], "coarse"))
+    looked = list(look(network, scenes(), [Question("hazard_stop"), Question("relative_angle")], "hirescam"))
     assert len(looked) == 4
     assert [len(one.attentions) for one in looked] == [2] * 4
-    alone = next(look(network, iter([Scene(images[3], Command.LEFT, 0.5)]), [Question("hazard_stop")], "coarse"))
+    alone = next(look(network, iter([Scene(images[3], Command.LEFT, 0.5)]), [Question("hazard_stop")], "hirescam"))
     assert (looked[3].attentions[0].now != alone.attentions[0].now).any()
     assert panels(looked[0], (1.0, 1.0)).shape[1] == 2 * PANEL_WIDTH
 

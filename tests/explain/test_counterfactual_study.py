@@ -15,11 +15,11 @@ from PIL import Image as Picture
 from caldrive.datatypes import CameraConfig, LightState, VehicleState
 from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.settings import EpisodeSettings
+from caldrive.explain.activation_maps import Question
 from caldrive.explain.cases import Case
 from caldrive.explain.counterfactual_episode import StudyConfig, episode_path, shown_before
 from caldrive.explain.counterfactual_study import study
 from caldrive.explain.counterfactuals import Studio, see
-from caldrive.explain.gradcam import Question
 from caldrive.explain.interventions import INTERVENTIONS
 from caldrive.files import write_whole
 from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
@@ -28,8 +28,8 @@ from caldrive.perception.network.tensor_file import write_tensors
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import CameraRig
 from tests.command_line import run_json
+from tests.explain.test_activation_maps import CONFIG
 from tests.explain.test_counterfactuals import case
-from tests.explain.test_gradcam import CONFIG
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def config(network: Network, tmp_path: Path) -> StudyConfig:
     path = tmp_path / "network.safetensors"
     save_network(path, network, CheckpointInfo(network.config))
     settings = EpisodeSettings(task="navigation-dynamic", people=60, cars=3, seconds=5.0)
-    return StudyConfig(path, tuple(chosen_scenarios(settings, 2)), cases=2, layer="coarse", seed=3)
+    return StudyConfig(path, tuple(chosen_scenarios(settings, 2)), cases=2, method="gradcam", seed=3)
 
 
 def test_a_study_that_was_killed_goes_on_to_the_same_end(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from caldrive.datatypes import Pose, VehicleState
+from caldrive.explain.activation_maps import Question, Reply
 from caldrive.explain.cases import SITUATIONS, Case
 from caldrive.explain.counterfactuals import Change, Counterfactual, different, effects, interval, says
-from caldrive.explain.gradcam import Question, Reply
 from caldrive.explain.interventions import INTERVENTIONS, interventions_in
 from caldrive.world.rendering.camera import SceneState
 

@@ -39,7 +39,7 @@ from caldrive.explain.failure_pictures import (
 from caldrive.explain.moments import Glance, Plan
 from caldrive.perception.network.network import Network
 from tests.command_line import run_json
-from tests.explain.test_gradcam import CONFIG, pictures
+from tests.explain.test_activation_maps import CONFIG, pictures
 
 TEXT = "red light: seen 3 %, true yes"
 WANTED = Plan("red_light", (Glance(3, 3.0, 0.0, "1 s before", TEXT), Glance(13, 13.0, 0.0, "red light", TEXT)))

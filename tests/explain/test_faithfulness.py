@@ -10,6 +10,7 @@ import torch
 
 from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Image, Semantic
+from caldrive.explain.activation_maps import Attention, Map, Question, Reply
 from caldrive.explain.faithfulness import (
     ABOUT,
     about,
@@ -22,9 +23,8 @@ from caldrive.explain.faithfulness import (
     score_of,
     similarity,
 )
-from caldrive.explain.gradcam import Attention, Map, Question, Reply
 from caldrive.perception.network.network import Network
-from tests.explain.test_gradcam import CONFIG, pictures
+from tests.explain.test_activation_maps import CONFIG, pictures
 
 SIZE = (44, 100)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from caldrive.explain.gradcam import Attention, Reply
+from caldrive.explain.activation_maps import Attention, Reply
 from caldrive.explain.overlay import BAR, GREEN, LARGER, RED, SMALLER, explained, likely_color, overlay, said, scale_of
 
 IMAGE = np.full((40, 80, 3), 100, np.uint8)

@@ -15,7 +15,7 @@ from caldrive.explain.recorded import contact_sheet, figures
 from caldrive.explain.situations import SITUATIONS, find_examples
 from caldrive.perception.network.network import Network
 from caldrive.recordings.writer import EpisodeError, EpisodeWriter
-from tests.explain.test_gradcam import CONFIG
+from tests.explain.test_activation_maps import CONFIG
 from tests.perception.data import SCENARIO, make_frame
 
 HEIGHT, WIDTH = CONFIG.image_size

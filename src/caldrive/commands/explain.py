@@ -48,8 +48,8 @@ class AttentionSettings:
 
     affordance: UseAppendAction[tuple[str, ...]] = ()
     """An affordance to draw the attention of; may be given again. Without it hazard_stop and red_light."""
-    layer: Literal["coarse", "fine"] = "coarse"
-    """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
+    method: Literal["hirescam", "gradcam"] = "hirescam"
+    """hirescam: what counted at each place, of 8 x 8 pixels; gradcam: as in the paper, of 16 x 16."""
 
     @property
     def affordances(self) -> tuple[str, ...]:
@@ -59,7 +59,7 @@ class AttentionSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class ExplainDrive(AttentionSettings, EpisodeSettings, Configurable):
-    """Drive an episode, and film where the network looks (Grad-CAM), whoever drives."""
+    """Drive an episode, and film where the network looks, whoever drives."""
 
     out: Path = Path("out/attention.mp4")
     """The video."""
@@ -68,7 +68,7 @@ class ExplainDrive(AttentionSettings, EpisodeSettings, Configurable):
         """Drives; answers with the video."""
         from caldrive.explain.attention_video import drive_attention
 
-        frames = drive_attention(self, self.affordances, self.layer, self.out, progress)
+        frames = drive_attention(self, self.affordances, self.method, self.out, progress)
         return Answer({"video": str(self.out), "frames": frames}, f"attention in {frames} frames: {self.out}")
 
 
@@ -83,7 +83,7 @@ class ExplainPictures(AttentionSettings, PictureSettings, Output):
         """Looks at the pictures; answers with the video."""
         from caldrive.explain.attention_video import see_attention
 
-        frames = see_attention(self, self.affordances, self.layer, progress)
+        frames = see_attention(self, self.affordances, self.method, progress)
         return Answer({"video": str(self.out), "frames": frames}, f"attention in {frames} pictures: {self.out}")
 
 
@@ -101,8 +101,8 @@ class ExplainRecording(Output):
     """Frames of each situation on the sheet."""
     measured: int = 0
     """Frames of each situation that are measured, which takes several seconds each; 0 measures none."""
-    layer: Literal["coarse", "fine"] = "coarse"
-    """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
+    method: Literal["hirescam", "gradcam"] = "hirescam"
+    """hirescam: what counted at each place, of 8 x 8 pixels; gradcam: as in the paper, of 16 x 16."""
     seed: int = 0
     """Decides which frames."""
     out: Path = Path("out/attention.png")
@@ -126,9 +126,9 @@ class ExplainRecording(Output):
         wanted = max(self.examples, self.measured)
         found = find_examples(self.folder, wanted, network.span - 1, self.seed, keys)
         shown = {name: chosen[: self.examples] for name, chosen in found.items()}
-        write_whole(self.out, contact_sheet(network, shown, self.layer))
+        write_whole(self.out, contact_sheet(network, shown, self.method))
         measured = {name: chosen[: self.measured] for name, chosen in found.items()}
-        results = figures(network, measured, self.layer, self.seed, progress) if self.measured else []
+        results = figures(network, measured, self.method, self.seed, progress) if self.measured else []
         values = {"out": str(self.out), "figures": [asdict(one) for one in results]}
         return Answer(values, attention_table(results, self.out))
 
@@ -156,8 +156,8 @@ class ExplainCounterfactuals(Output):
     """Decides everything random."""
     model: Path | None = None
     """The network, a .safetensors file; without it the one in the package."""
-    layer: Literal["coarse", "fine"] = "coarse"
-    """coarse: the network's last convolution, a place for 16 x 16 pixels; fine: the last of the stage before."""
+    method: Literal["hirescam", "gradcam"] = "hirescam"
+    """hirescam: what counted at each place, of 8 x 8 pixels; gradcam: as in the paper, of 16 x 16."""
     workers: int = 2
     """Episodes that are driven at the same time."""
     out: Path = Path("out/counterfactuals")
@@ -168,16 +168,16 @@ class ExplainCounterfactuals(Output):
         from caldrive.agents.rows import model_path
         from caldrive.checks import require_within
         from caldrive.commands.explain_tables import study_table
+        from caldrive.explain.activation_maps import require_captum
         from caldrive.explain.counterfactual_episode import StudyConfig
         from caldrive.explain.counterfactual_study import study
-        from caldrive.explain.gradcam import require_captum
         from caldrive.perception.network.checkpoint import read_info
 
         require_within("--cases", self.cases, 1, 1000, 40)
         require_captum()  # before the drive, not after it
         path = model_path(self.model)
         read_info(path)  # likewise: whether it is a network
-        config = StudyConfig(path, tuple(self.scenarios()), self.cases, self.layer, self.seed)
+        config = StudyConfig(path, tuple(self.scenarios()), self.cases, self.method, self.seed)
         found = study(config, self.out, self.workers, progress)
         values = {
             "sheet": str(found.sheet), "found": found.found, "effects": [asdict(one) for one in found.effects],

@@ -21,7 +21,7 @@ from caldrive.driving.rollout import rollout
 from caldrive.driving.see import at_size, kept_rows, parse_crop
 from caldrive.driving.settings import EpisodeSettings, PictureSettings
 from caldrive.driving.setup import set_up
-from caldrive.explain.gradcam import Attention, Question, attend
+from caldrive.explain.activation_maps import Attention, Question, attend
 from caldrive.explain.overlay import explained, scale_of
 from caldrive.perception.network.checkpoint import load_network
 from caldrive.perception.network.network import Network
@@ -52,18 +52,18 @@ class Looked:
 
 
 def drive_attention(
-    settings: EpisodeSettings, affordances: Sequence[str], layer: str, out: Path, progress: Progress = silent
+    settings: EpisodeSettings, affordances: Sequence[str], method: str, out: Path, progress: Progress = silent
 ) -> int:
     """Drives an episode and writes the video of where CAL's network looks (that of `settings` where it drives, else the
     package's); returns its number of frames. Raises ValueError for settings that cannot be."""
     questions = _checked(affordances, out)
     network, _ = load_network(model_path(settings.model if settings.agent == "cal" else None))
     scenes = _driven(settings)
-    return _write(network, scenes, questions, layer, out, 10.0, progress)
+    return _write(network, scenes, questions, method, out, 10.0, progress)
 
 
 def see_attention(
-    settings: PictureSettings, affordances: Sequence[str], layer: str, progress: Progress = silent
+    settings: PictureSettings, affordances: Sequence[str], method: str, progress: Progress = silent
 ) -> int:
     """The same for a person's own pictures, as `caldrive see` takes them."""
     questions = _checked(affordances, settings.out)
@@ -71,7 +71,7 @@ def see_attention(
     network, _ = load_network(model_path(settings.model))
     source = open_source(settings.source, settings.every)
     scenes = _pictures(settings, network.config.image_size)
-    return _write(network, scenes, questions, layer, settings.out, source.rate / source.every, progress)
+    return _write(network, scenes, questions, method, settings.out, source.rate / source.every, progress)
 
 
 def _checked(affordances: Sequence[str], out: Path) -> list[Question]:
@@ -106,11 +106,11 @@ def _pictures(settings: PictureSettings, size: tuple[int, int]) -> Iterator[Scen
 
 
 def _write(
-    network: Network, scenes: Iterable[Scene], questions: Sequence[Question], layer: str, out: Path, rate: float,
+    network: Network, scenes: Iterable[Scene], questions: Sequence[Question], method: str, out: Path, rate: float,
     progress: Progress,
 ) -> int:  # fmt: skip
     """Writes the video. All scenes come before its first frame: one scale holds for all of them."""
-    looked = list(look(network, scenes, questions, layer, progress))
+    looked = list(look(network, scenes, questions, method, progress))
     if not looked:
         raise ValueError("found no picture, wanted one at least: give another file")
     scales = [scale_of([one.attentions[k].now for one in looked]) for k in range(len(questions))]
@@ -121,7 +121,7 @@ def _write(
 
 
 def look(
-    network: Network, scenes: Iterable[Scene], questions: Sequence[Question], layer: str, progress: Progress = silent
+    network: Network, scenes: Iterable[Scene], questions: Sequence[Question], method: str, progress: Progress = silent
 ) -> Iterator[Looked]:
     """The attention in each scene, with those before it as its history."""
     history: deque[Image] = deque(maxlen=network.span)
@@ -129,7 +129,7 @@ def look(
         history.append(scene.image)
         images = list(history)
         attentions = tuple(
-            attend(network, Question(question.affordance, scene.command, question.label), images, layer)
+            attend(network, Question(question.affordance, scene.command, question.label), images, method)
             for question in questions
         )
         progress("attention", scene.done)
@@ -153,8 +153,8 @@ class LiveAttention:
     """Draws the attention to one affordance while a car drives, for recordings. Its scale is the largest so far: what
     comes is not known yet. model: the network, None for the one in the package."""
 
-    def __init__(self, affordance: str, model: Path | None = None, layer: str = "coarse") -> None:
-        self.question, self.layer = Question(affordance), layer
+    def __init__(self, affordance: str, model: Path | None = None, method: str = "hirescam") -> None:
+        self.question, self.method = Question(affordance), method
         self.network, _ = load_network(model_path(model))
         self._history: deque[Image] = deque(maxlen=self.network.span)
         self._scale, self._time = 0.0, 0.0
@@ -168,6 +168,6 @@ class LiveAttention:
         self._time = observation.time
         self._history.append(observation.image)
         question = replace(self.question, command=observation.command)
-        attention = attend(self.network, question, list(self._history), self.layer)
+        attention = attend(self.network, question, list(self._history), self.method)
         self._scale = max(self._scale, scale_of([attention.now]))
         return explained(observation.image, attention, self._scale, width=PANEL_WIDTH)

@@ -16,7 +16,7 @@ import numpy as np
 from caldrive.datatypes import CameraConfig, LightState, PedestrianState, Pose, TrafficLight, Truth, VehicleState
 from caldrive.driving.referee import Referee
 from caldrive.driving.rollout import rollout
-from caldrive.explain.gradcam import Question
+from caldrive.explain.activation_maps import Question
 from caldrive.explain.situations import NEAR_CAR
 from caldrive.geometry import moved, to_local
 from caldrive.interfaces import Agent

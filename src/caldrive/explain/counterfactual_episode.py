@@ -35,13 +35,13 @@ CROSSING = 4.0  # times as often as usual people cross the road: else a hazard b
 
 @dataclass(frozen=True)
 class StudyConfig:
-    """What is studied. scenarios: of one town; cases: at most, of each situation; layer: see `gradcam.LAYERS`; seed:
-    decides which moments of a drive."""
+    """What is studied. scenarios: of one town; cases: at most, of each situation; method: see
+    `activation_maps.METHODS`; seed: decides which moments of a drive."""
 
     model: Path
     scenarios: tuple[Scenario, ...]
     cases: int
-    layer: str
+    method: str
     seed: int
 
     @property
@@ -51,7 +51,7 @@ class StudyConfig:
 
     def decisive(self) -> dict[str, object]:
         """All that the findings depend on, in JSON's types."""
-        about = {"code": code_version(), "model": file_digest(self.model), "cases": self.cases, "layer": self.layer}
+        about = {"code": code_version(), "model": file_digest(self.model), "cases": self.cases, "method": self.method}
         scenarios = json.loads(json.dumps([asdict(scenario) for scenario in self.scenarios]))
         return about | {"seed": self.seed, "scenarios": scenarios}
 
@@ -80,7 +80,7 @@ def study_episode(config: StudyConfig, out: Path, episode: int) -> None:
     assert isinstance(world, EmbeddedWorld)
     findings, shown = EpisodeFindings(), shown_before(out, episode)
     with closing(world), closing(CameraRig(load_town(scenario.town))) as rig:
-        studio = Studio(rig, network, config.layer)
+        studio = Studio(rig, network, config.method)
         for seen in _seen(studio, world, oracle, scenario, config=config, episode=episode):
             findings.gaps.append(_driving_gap(at_the_wheel, seen))
             _add(findings, seen, shown)

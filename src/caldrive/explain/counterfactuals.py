@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import CameraConfig, Image
+from caldrive.explain.activation_maps import Attention, Reply, ask, attend, frames_back
 from caldrive.explain.cases import Case
-from caldrive.explain.gradcam import Attention, Reply, ask, attend, frames_back
 from caldrive.explain.interventions import UNCHANGED, Intervention, interventions_in
 from caldrive.explain.situations import NEAR_CAR
 from caldrive.perception.network.network import Network
@@ -36,8 +36,8 @@ class Studio:
 
     rig: CameraRig
     network: Network
-    layer: str = "coarse"
-    """Whose attention is asked for, see `gradcam.LAYERS`."""
+    method: str = "hirescam"
+    """Whose attention is asked for, see `activation_maps.METHODS`."""
 
     @property
     def camera(self) -> CameraConfig:
@@ -74,7 +74,7 @@ class Seen:
     @cached_property
     def attention(self) -> Attention:
         """Where the network looks."""
-        return attend(self.studio.network, self.case.question, self.images, self.studio.layer)
+        return attend(self.studio.network, self.case.question, self.images, self.studio.method)
 
     @property
     def is_right(self) -> bool:

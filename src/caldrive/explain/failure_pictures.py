@@ -41,7 +41,6 @@ FOLDER, VERSION = "attention", 1
 MOST = 30  # failures that are drawn; more would not fit on a page
 STILL = replace(CameraConfig(), width=320, height=141)
 QUALITY = JPEG | {"quality": 65}
-LAYER = "fine"  # the coarse one does not tell a lamp from the house behind it
 SAME = 0.01  # m, within which a car is at the same place
 NO_NETWORK = "No attention: only CAL's own network can show where it looks."
 OTHERWISE = "Driven again, the episode went differently: this agent does not do the same each time."
@@ -122,7 +121,7 @@ def _network(driver: AgentSettings) -> Network | None:
     """The network that drove, None for an agent without one of ours."""
     if driver.agent != "cal":
         return None
-    from caldrive.explain.gradcam import require_captum
+    from caldrive.explain.activation_maps import require_captum
     from caldrive.perception.network.checkpoint import load_network
 
     require_captum()
@@ -168,10 +167,10 @@ def _save(run: BenchmarkRun, key: str, wanted: Plan, snapshots: Sequence[Snapsho
 def _attention(network: Network, affordance: str, snapshots: Sequence[Snapshot]) -> tuple[list[Image], tuple[str, ...]]:
     """The stills with what the network looks at in each, and what it says. Each has a scale of its own: the gradient is
     many times larger in one moment than in another."""
-    from caldrive.explain.gradcam import Question, attend
+    from caldrive.explain.activation_maps import Question, attend
     from caldrive.explain.overlay import overlay, scale_of
 
-    attentions = [attend(network, Question(affordance, one.command), one.images, LAYER) for one in snapshots]
+    attentions = [attend(network, Question(affordance, one.command), one.images) for one in snapshots]
     pictures = [
         overlay(one.still, attention.now, scale_of([attention.now]), attention.reply.probability)
         for one, attention in zip(snapshots, attentions, strict=True)

@@ -20,7 +20,7 @@ from scipy.stats import spearmanr
 from torch import nn
 
 from caldrive.datatypes import Image, Semantic
-from caldrive.explain.gradcam import Attention, Map, Question, ask, upsampled
+from caldrive.explain.activation_maps import Attention, Map, Question, ask, upsampled
 from caldrive.perception.network.network import Network
 
 Mask = NDArray[np.bool_]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from caldrive.datatypes import Semantic
+from caldrive.explain.activation_maps import upsampled
 from caldrive.explain.counterfactuals import FEWEST_CHANGED, Counterfactual, Mask, Seen, Values, interval, score
 from caldrive.explain.faithfulness import energy_inside
-from caldrive.explain.gradcam import upsampled
 from caldrive.explain.interventions import (
     AWAY,
     NO_OUTLINES,

@@ -15,7 +15,7 @@ from PIL import Image as Picture
 from PIL import ImageDraw
 
 from caldrive.datatypes import Image
-from caldrive.explain.gradcam import Attention, Map, Reply, upsampled
+from caldrive.explain.activation_maps import Attention, Map, Reply, upsampled
 from caldrive.visualization.gauges import BACKGROUND, MUTED, Draw, write
 
 GREEN, YELLOW, RED = (46, 160, 67), (250, 204, 21), (220, 38, 38)

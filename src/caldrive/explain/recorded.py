@@ -12,6 +12,7 @@ from PIL import Image as Picture
 from PIL import ImageDraw
 
 from caldrive.datatypes import Image
+from caldrive.explain.activation_maps import Attention, Map, attend, upsampled
 from caldrive.explain.faithfulness import (
     Curve,
     about,
@@ -24,7 +25,6 @@ from caldrive.explain.faithfulness import (
     score_of,
     similarity,
 )
-from caldrive.explain.gradcam import Attention, Map, attend, upsampled
 from caldrive.explain.overlay import explained, scale_of
 from caldrive.explain.situations import Example
 from caldrive.perception.network.network import Network
@@ -36,9 +36,9 @@ CAPTION = 24  # pixels above each row of the sheet
 CASCADE = (0, 1, 2, 3, 4, 5)  # stages of the backbone, from the last on, that are randomised beside the block
 
 
-def contact_sheet(network: Network, examples: Examples, layer: str = "coarse", width: int = 400) -> bytes:
+def contact_sheet(network: Network, examples: Examples, method: str = "hirescam", width: int = 400) -> bytes:
     """A PNG: a row for each situation, a column for each of its examples."""
-    rows = {name: _row(network, chosen, layer, width) for name, chosen in examples.items() if chosen}
+    rows = {name: _row(network, chosen, method, width) for name, chosen in examples.items() if chosen}
     sheet = Picture.new(
         "RGB",
         (max(row.shape[1] for row in rows.values()), sum(row.shape[0] + CAPTION for row in rows.values())),
@@ -54,9 +54,9 @@ def contact_sheet(network: Network, examples: Examples, layer: str = "coarse", w
     return content.getvalue()
 
 
-def _row(network: Network, examples: Sequence[Example], layer: str, width: int) -> Image:
+def _row(network: Network, examples: Sequence[Example], method: str, width: int) -> Image:
     """Examples beside each other, each with a scale of its own: they are of different drives."""
-    attentions = [attend(network, example.question, example.images, layer) for example in examples]
+    attentions = [attend(network, example.question, example.images, method) for example in examples]
     pictures = [
         explained(example.images[-1], attention, scale_of([attention.now]), width=width)
         for example, attention in zip(examples, attentions, strict=True)
@@ -87,19 +87,19 @@ class Figures:
 
 
 def figures(
-    network: Network, examples: Examples, layer: str = "coarse", seed: int = 0, progress: Progress = silent
+    network: Network, examples: Examples, method: str = "hirescam", seed: int = 0, progress: Progress = silent
 ) -> list[Figures]:
     """One for each situation of which there are examples."""
     found = {name: chosen for name, chosen in examples.items() if chosen}
     results = []
     for k, (name, chosen) in enumerate(found.items()):
         progress(f"attention in {name}", k / len(found))
-        results.append(_figures(network, name, chosen, layer, seed))
+        results.append(_figures(network, name, chosen, method, seed))
     return results
 
 
-def _figures(network: Network, name: str, examples: Sequence[Example], layer: str, seed: int) -> Figures:
-    attentions = [attend(network, example.question, example.images, layer) for example in examples]
+def _figures(network: Network, name: str, examples: Sequence[Example], method: str, seed: int) -> Figures:
+    attentions = [attend(network, example.question, example.images, method) for example in examples]
     where = [_where(example, attention) for example, attention in zip(examples, attentions, strict=True)]
     known = [one for one in where if one is not None]
     pointing, energy, area = (mean(values) for values in zip(*known, strict=True)) if known else (None, None, None)
@@ -107,7 +107,7 @@ def _figures(network: Network, name: str, examples: Sequence[Example], layer: st
     own, random, centred = (_mean_curve([one[k] for one in curves]) for k in range(3))
     return Figures(
         situation=name, examples=len(examples), pointing=pointing, energy=energy, area=area, network=own, random=random,
-        centred=centred, cascade=_cascade(network, examples, attentions, layer, seed),
+        centred=centred, cascade=_cascade(network, examples, attentions, method, seed),
     )  # fmt: skip
 
 
@@ -148,13 +148,13 @@ def _mean_curve(curves: Sequence[Curve]) -> Curve:
 
 
 def _cascade(
-    network: Network, examples: Sequence[Example], attentions: Sequence[Attention], layer: str, seed: int
+    network: Network, examples: Sequence[Example], attentions: Sequence[Attention], method: str, seed: int
 ) -> tuple[float, ...]:
     """Mean rank correlations with the maps of a network that forgets, from its last layer on."""
     affordance = examples[0].situation.affordance
     correlations = []
     for stages in CASCADE:
         other = randomised(network, affordance, stages, seed)
-        again = [attend(other, example.question, example.images, layer) for example in examples]
+        again = [attend(other, example.question, example.images, method) for example in examples]
         correlations.append(mean(similarity(*pair) for pair in zip(attentions, again, strict=True)))
     return tuple(correlations)

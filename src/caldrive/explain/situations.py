@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Command, Image, Semantic
-from caldrive.explain.gradcam import Question
+from caldrive.explain.activation_maps import Question
 from caldrive.recordings.folder import episode_paths
 from caldrive.recordings.reader import Episode, read_episode
 from caldrive.recordings.writer import EpisodeError

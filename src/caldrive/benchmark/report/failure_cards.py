@@ -13,7 +13,7 @@ from caldrive.benchmark.report.runs import BenchmarkRun, Failure, FailureMoment,
 
 PICTURE_BYTES = 1_900_000  # of all pictures; on the page they take a third more, and it is to stay below 3 MB
 ATTENTION = (
-    "The second picture of a moment shows what the network looks at (Grad-CAM), each on a scale of its own. Of a "
+    "The second picture of a moment shows what the network looks at (HiResCAM), each on a scale of its own. Of a "
     "class, green to red says how likely the network finds it; of a number, orange makes it larger and blue smaller."
 )
 

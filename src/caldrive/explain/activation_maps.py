@@ -1,8 +1,13 @@
-"""Where the network looks: gradient-weighted class activation maps (Selvaraju et al. 2017; section 5 of the paper).
+"""Where the network looks: class activation maps from gradients (section 5 of the paper), by one of two methods.
 
-Captum computes them. All frames of a block's history pass the backbone as one batch: called frame by frame, Captum
-would keep the last one's map only and say nothing. The weights are those before they became 8-bit integers, which have
-no gradient.
+`gradcam` is the paper's (Selvaraju et al. 2017): the maps of the last convolution, each weighted by the mean of its
+gradient. `hirescam` (Draelos and Carin 2020) multiplies each place by its own gradient, so that a map shows what
+counted at that place; here it takes the stage before, whose places are half as large. docs/looking-inside.md measures
+both.
+
+Captum computes the gradients. All frames of a block's history pass the backbone as one batch: called frame by frame,
+Captum would keep the last one's map only and say nothing. The weights are those before they became 8-bit integers,
+which have no gradient.
 """
 
 from __future__ import annotations
@@ -24,9 +29,9 @@ from caldrive.perception.network.network import COMMANDS, Network
 from caldrive.perception.targets import decode
 
 Map = NDArray[np.float32]
-# The stage of the backbone, from 0, whose last convolution is looked at: VGG16's last one, as is usual, whose places
-# stand for 16 x 16 pixels, or the last of the stage before.
-LAYERS = {"coarse": 4, "fine": 3}
+# The stage of the backbone, from 0, whose last convolution is looked at: of the last one a place stands for 16 x 16
+# pixels, of the one before for 8 x 8.
+METHODS = {"hirescam": 3, "gradcam": 4}
 
 
 @dataclass(frozen=True)
@@ -102,18 +107,21 @@ def ask(network: Network, question: Question, images: Sequence[Image]) -> Reply:
         return _reply(question, _outputs(network, question, _batch(network, question, images)))
 
 
-def attend(network: Network, question: Question, images: Sequence[Image], layer: str = "coarse") -> Attention:
-    """Where a network looks, in images as for `ask`. Raises ValueError for an unknown layer, RuntimeError without
+def attend(network: Network, question: Question, images: Sequence[Image], method: str = "hirescam") -> Attention:
+    """Where a network looks, in images as for `ask`. Raises ValueError for an unknown method, RuntimeError without
     Captum."""
     captum = require_captum()
-    if layer not in LAYERS:
-        raise ValueError(f"found layer {layer!r}, wanted one of {', '.join(LAYERS)}: type --layer coarse")
+    if method not in METHODS:
+        raise ValueError(f"found method {method!r}, wanted one of {', '.join(METHODS)}: type --method hirescam")
     batch = _batch(network, question, images)
     with torch.no_grad():
         reply = _reply(question, _outputs(network, question, batch))
-    gradcam = captum.LayerGradCam(partial(_outputs, network, question), _last_convolution(network, LAYERS[layer]))
-    maps = gradcam.attribute(batch, reply.target, relu_attributions=question.spec.discrete)
-    arrays = maps.detach()[:, 0].numpy().astype(np.float32)
+    asked, layer = partial(_evidence, network, question, reply.target), _last_convolution(network, METHODS[method])
+    if method == "gradcam":
+        maps = captum.LayerGradCam(asked, layer).attribute(batch)[:, 0]
+    else:
+        maps = captum.LayerGradientXActivation(asked, layer).attribute(batch).sum(1)
+    arrays = (maps.relu() if question.spec.discrete else maps).detach().numpy().astype(np.float32)
     return Attention(reply, tuple(arrays), frames_back(network, question.affordance))
 
 
@@ -161,6 +169,16 @@ def _outputs(network: Network, question: Question, images: Tensor) -> Tensor:
     command = torch.tensor([[COMMANDS.index(question.command)]])
     result: Tensor = network.task_blocks()[question.affordance](history[None], command)
     return result
+
+
+def _evidence(network: Network, question: Question, target: int, images: Tensor) -> Tensor:
+    """What is looked for in the images, (1,): a value, or how much more speaks for a class than for all others. Its own
+    output says little where that of the others falls at the same places."""
+    outputs = _outputs(network, question, images)
+    if not question.spec.discrete:
+        return outputs[:, target]
+    others = torch.cat((outputs[:, :target], outputs[:, target + 1 :]), dim=1)
+    return outputs[:, target] - others.logsumexp(1)
 
 
 def _last_convolution(network: Network, stage: int) -> nn.Module:

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from caldrive.datatypes import Command, Image
-from caldrive.explain import gradcam
-from caldrive.explain.gradcam import Question, ask, attend, frames_back, upsampled
+from caldrive.explain import activation_maps
+from caldrive.explain.activation_maps import Question, ask, attend, frames_back, upsampled
 from caldrive.perception.inference.predictor import NetworkPerception
 from caldrive.perception.network.config import BlockConfig, NetworkConfig
 from caldrive.perception.network.network import Network
@@ -37,10 +38,11 @@ def pictures(n: int, seed: int = 0) -> list[Image]:
 def test_every_frame_of_the_history_has_a_map(network: Network) -> None:
     attention = attend(network, Question("hazard_stop"), pictures(5))
     assert attention.back == frames_back(network, "hazard_stop") == (4, 2, 0)
-    assert [one.shape for one in attention.maps] == [(5, 12)] * 3
+    assert [one.shape for one in attention.maps] == [(11, 25)] * 3
     assert len({one.tobytes() for one in attention.maps}) == 3
     assert sum(attention.shares) == pytest.approx(1.0)
-    assert [one.shape for one in attend(network, Question("red_light"), pictures(1), layer="fine").maps] == [(11, 25)]
+    of_the_paper = attend(network, Question("red_light"), pictures(1), method="gradcam")
+    assert [one.shape for one in of_the_paper.maps] == [(5, 12)]
 
 
 def test_what_was_long_ago_counts_for_nothing_where_the_block_sees_one_frame(network: Network) -> None:
@@ -106,9 +108,33 @@ def test_questions_that_cannot_be_end_in_a_sentence(question: tuple[str, int | N
         Question(question[0], label=question[1])
 
 
-def test_unknown_layers_and_a_missing_library_are_named(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="found layer 'first', wanted one of coarse, fine"):
-        attend(network, Question("red_light"), pictures(1), layer="first")
+@pytest.mark.parametrize("method", activation_maps.METHODS)
+def test_what_speaks_for_a_class_speaks_against_the_other(network: Network, method: str) -> None:
+    for_red, for_none = (
+        attend(network, Question("red_light", label=label), pictures(1), method).now for label in (1, 0)
+    )
+    assert for_red.any()
+    assert for_none.any()
+    assert not ((for_red > 0) & (for_none > 0)).any()
+
+
+def test_a_map_of_hirescam_sums_to_the_change_along_its_activations(network: Network) -> None:
+    """By Euler: the sum of activation times gradient is how fast the value changes as all of them grow by a share."""
+    share, layer = 1e-3, network.backbone.stages[activation_maps.METHODS["hirescam"]]
+    assert isinstance(layer, nn.ModuleList)
+    question, images = Question("relative_angle"), pictures(1)
+    expected = float(attend(network, question, images).now.sum()) * question.spec.scale
+    values = []
+    for factor in (1 - share, 1 + share):
+        hook = layer[-1].register_forward_hook(lambda module, given, output, factor=factor: output * factor)
+        values.append(ask(network, question, images).value)
+        hook.remove()
+    assert expected == pytest.approx((values[1] - values[0]) / (2 * share), rel=0.05, abs=1e-5)
+
+
+def test_unknown_methods_and_a_missing_library_are_named(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="found method 'first', wanted one of hirescam, gradcam"):
+        attend(network, Question("red_light"), pictures(1), method="first")
     monkeypatch.setitem(__import__("sys").modules, "captum.attr", None)
     with pytest.raises(RuntimeError, match=r"found no Captum, wanted it .*pip install 'caldrive\[explain\]'"):
         attend(network, Question("red_light"), pictures(1))
@@ -118,7 +144,7 @@ def test_the_newest_of_few_images_comes_last(network: Network) -> None:
     images: Sequence[Image] = pictures(1)
     question = Question("hazard_stop")
     assert ask(network, question, images) == ask(network, question, [images[0]] * 5)
-    assert gradcam.LAYERS["coarse"] == len(network.backbone.stages) - 1
+    assert activation_maps.METHODS["gradcam"] == len(network.backbone.stages) - 1
 
 
 def test_images_of_another_size_end_in_a_sentence(network: Network) -> None:
