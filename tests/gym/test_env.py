@@ -93,9 +93,12 @@ def test_only_what_the_settings_name_terminates() -> None:
     assert terminated
     assert info["crash"] or info["crash_sidewalk"]
     assert info["rewards"]["end"] < 0
+    assert info["cost"] >= 1
     _, truncated, info = ends(ends=(InfractionKind.RED_LIGHT,), frame_skip=5)
     assert truncated
     assert info["infractions"]
+    assert info["cost"] == 0  # nothing more in the last action
+    assert not info["red_light"]
 
 
 def test_an_action_holds_for_some_steps_and_their_rewards_add_up(road: DrivingEnv) -> None:

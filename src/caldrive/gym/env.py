@@ -90,6 +90,7 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Drives on for `frame_skip` steps of 0.1 s, or until the episode ends."""
         drive, total = self._current, dict[str, float]()
+        known = len(drive.referee.infractions)
         control = control_of(self.config.action, action, drive.observation.speed)
         for _ in range(self.config.frame_skip):
             observation = self._move(drive, control, total)
@@ -98,7 +99,8 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
         reward, outcome = sum(total.values()), drive.referee.outcome
         drive.reward += reward
         drive.length += 1
-        info = self._info(drive) | {"rewards": total, "step_reward": reward}
+        cost = float(len(drive.referee.infractions) - known)
+        info = self._info(drive) | {"rewards": total, "step_reward": reward, "cost": cost}
         terminated = outcome in (Outcome.SUCCESS, Outcome.FAILED) or drive.left_route
         truncated = outcome is Outcome.TIMEOUT and not terminated
         return observed(self.config, observation, drive.truth), reward, terminated, truncated, info
@@ -184,6 +186,7 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
             **{key: kind in broken for kind, key in COLLISION_KEYS.items()},
             "crash": not broken.isdisjoint(COLLISION_KEYS),
             "crash_sidewalk": InfractionKind.SIDEWALK in broken,
+            "red_light": InfractionKind.RED_LIGHT in broken,
             "left_route": drive.left_route,
             "out_of_road": truth.sidewalk_share > 0,
             "route_completion": min(1.0, max(0.0, truth.route_done / truth.route_length)),
@@ -191,6 +194,7 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
             "infractions": [infraction.kind.value for infraction in drive.referee.infractions],
             "episode_reward": drive.reward,
             "episode_length": drive.length,
+            "env_seed": scenario.seed,
             "town": scenario.town,
             "weather": scenario.weather,
             "task": scenario.task,
