@@ -61,7 +61,7 @@ class Episode:
                 lights=self._lights,
             )
         try:
-            self._update(time=0.0, progress=0.0, contacts=())
+            self._update(time=0.0, progress=0.0, people=self._pedestrians.states(), contacts=())
         except BaseException:
             self.close()  # nobody else can: there is no episode yet
             raise
@@ -80,16 +80,17 @@ class Episode:
                 self._traffic.step(time, ego, before.pedestrians)
         with self._timed("pedestrians"):
             self._pedestrians.step(DT, [ego, *before.vehicles], self._curvature())
+            people = self._pedestrians.states()
         with self._timed("contacts"):
-            contacts = self._resolve_contacts((*self._cars(before.progress), *self._pedestrians.states()))
+            contacts = self._resolve_contacts((*self._cars(before.progress), *people))
         here = self._ego.pose
         progress = self.route.line.project(here.x, here.y, near=before.progress).s
-        self._update(time, progress, contacts)
+        self._update(time, progress, people, contacts)
 
     def displace(self, left: float, turn: float) -> None:
         """Puts the ego some metres to the left and turns it (rad)."""
         self._ego = replace(self._ego, pose=moved(self._ego.pose, left=left, turn=turn))
-        self._update(self.state.time, self.state.progress, self.state.contacts)
+        self._update(self.state.time, self.state.progress, self.state.pedestrians, self.state.contacts)
 
     def release(self) -> None:
         """Lets another episode of this process have SUMO."""
@@ -135,10 +136,10 @@ class Episode:
         there = [*((car, heights[car.id]) for car in cars), *((car.state, car.height) for car in self._parked.cars)]
         return tuple(car for car, height in there if level.holds(car.pose.x, car.pose.y, height, progress))
 
-    def _update(self, time: float, progress: float, contacts: tuple[Contact, ...]) -> None:
+    def _update(
+        self, time: float, progress: float, people: tuple[PedestrianState, ...], contacts: tuple[Contact, ...]
+    ) -> None:
         """Takes down who is where now, and what is true of it."""
-        with self._timed("pedestrians"):
-            people = self._pedestrians.states()
         with self._timed("lights"):
             lights = self._lights.states()
         vehicles = self._cars(progress)

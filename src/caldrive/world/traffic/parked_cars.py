@@ -35,6 +35,7 @@ TO_LINE = math.sqrt(2 * LINE / ACCELERATION)  # s
 SEEN = 7.2  # m from the ego's bumper to the car's middle within which it is in A2
 SLOWEST, FASTEST = 2.5, 7.5  # m/s of an ego before which somebody pulls out
 STANDS, AFTER = 0.3, 1.5  # m/s below which the ego stands, and s for which it has to before the car goes on
+FARTHEST = 30.0  # m from the ego, beyond which nobody who is parked begins
 OTHERS = 14.0  # m around it within which no other car may drive
 GONE = 5.0  # m that the ego is past its front when it may follow
 
@@ -69,10 +70,17 @@ class ParkedCar:
     """m/s."""
     stood: float = 0.0
     """s for which the ego has stood before it."""
+    _last: tuple[float, float, VehicleState] | None = None
+    """Its way and speed when it was last looked at, and what was seen: nearly all stand."""
 
     @property
     def state(self) -> VehicleState:
         """As the world sees it."""
+        if self._last is None or self._last[:2] != (self.way, self.speed):
+            self._last = self.way, self.speed, self._state()
+        return self._last[2]
+
+    def _state(self) -> VehicleState:
         share = min(self.way / WAY, 1.0)
         left = -BESIDE * (1 - share * share * (3 - 2 * share))
         turn = math.atan(BESIDE * 6 * share * (1 - share) / WAY)
@@ -154,6 +162,9 @@ def _move(car: ParkedCar, dt: float, ego: VehicleState, others: Sequence[Vehicle
     if car.stage is Stage.PARKED and not car.willing:
         return
     state = car.state
+    x, y = state.pose.x - ego.pose.x, state.pose.y - ego.pose.y
+    if car.stage is Stage.PARKED and max(abs(x), abs(y)) > FARTHEST:
+        return
     ahead, left = to_local(moved(ego.pose, forward=ego.length / 2), np.array((state.pose.x, state.pose.y))).tolist()
     along = abs(wrap_angle(ego.pose.heading - car.lane.line.heading_at(car.s))) < 0.3
     if car.stage is Stage.PARKED:

@@ -34,6 +34,7 @@ PATIENCE = 5.0  # s of waiting at the kerb before walking on, or on the road bef
 KERB = 1.2  # m from the middle of the sidewalk
 NO_WAY = 1e-9  # m: as good as there
 Flags = NDArray[np.bool_]
+Along = tuple[Floats, Sequence[Crossing]]  # crossings from a sidewalk, and where each begins, m along it
 NO_SCREENS = np.zeros((0, 2))
 
 
@@ -101,7 +102,9 @@ class Pedestrians:
             crossing_pace=np.zeros(n), start=np.zeros((n, 2)), end=np.zeros((n, 2)),
         )  # fmt: skip
         self.crossing: list[Crossing | None] = [None] * n
-        self._screened = [_screened(ways, screens) for ways in self.sidewalks.crossings] if n else []
+        everywhere = self.sidewalks.crossings if n else []
+        self._ways = [_along(ways) for ways in everywhere]
+        self._screened = [_along(_screened(ways, screens)) for ways in everywhere]
         self._cars = Cars(boxes_of(()))
         self._path = 0.0  # 1/m: the curvature of the ego's path lately
         self._hiding: set[int] = set()  # those who look for something to come from behind
@@ -136,15 +139,15 @@ class Pedestrians:
             self._hiding.add(k)
         else:
             self._hiding.discard(k)
-            self._look_for_a_way(k, self.sidewalks.crossings)
+            self._look_for_a_way(k, self._ways)
 
-    def _look_for_a_way(self, k: int, ways: Sequence[Sequence[Crossing]]) -> None:
+    def _look_for_a_way(self, k: int, ways: Sequence[Along]) -> None:
         """Somebody crosses if one of these ways begins here, and no car stands in it."""
-        s = self.walkers.s[k]
-        near = next((way for way in ways[self.walkers.loop[k]] if abs(way.s - s) < CROSSING_REACH), None)
-        if near is not None and is_clear(self.walkers.position[k], near.end, self._cars):
+        along, crossings = ways[self.walkers.loop[k]]
+        near = np.flatnonzero(np.abs(along - self.walkers.s[k]) < CROSSING_REACH)
+        if len(near) and is_clear(self.walkers.position[k], crossings[near[0]].end, self._cars):
             self._hiding.discard(k)
-            self._take(k, near)
+            self._take(k, crossings[near[0]])
 
     def _take(self, k: int, way: Crossing | None) -> None:
         """Somebody crosses on a way from now on, or on none."""
@@ -175,6 +178,10 @@ class Pedestrians:
             PedestrianState(Pose(x, y, heading), speed, on_road=on_road, id=name)
             for (x, y), heading, speed, on_road, name in zip(*numbers, strict=True)
         )
+
+
+def _along(ways: Sequence[Crossing]) -> Along:
+    return np.array([way.s for way in ways]), ways
 
 
 def _screened(ways: Sequence[Crossing], screens: Points) -> list[Crossing]:
