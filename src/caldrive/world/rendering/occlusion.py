@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy.ndimage import binary_dilation
 
+from caldrive.compiled import compiled, inlined
 from caldrive.datatypes import Points
 from caldrive.geometry import box_corners
 from caldrive.world.scene.scenery import Prop
@@ -19,8 +20,16 @@ PIXEL = 2.0  # m of the map
 STEP = 4.0  # m along a ray
 RAYS = 180
 CELL = 12.0  # m, side of a cell
+BLOCK = 240.0  # m, of which the sides of a map are multiples
 MARGIN = 150.0  # m of map beyond the outermost building
 Cells = NDArray[np.int64]  # (N, 2), a point's coordinates divided by CELL and rounded down
+
+
+class Walls(NamedTuple):
+    """A map of walls from its origin (2,) in m on, in pixels of PIXEL m (rows, columns)."""
+
+    origin: Points
+    pixels: NDArray[np.bool_]
 
 
 class OcclusionMap:
@@ -34,46 +43,63 @@ class OcclusionMap:
         self._low, self._high = corners.min(axis=0) - MARGIN, corners.max(axis=0) + MARGIN
         angles = (np.arange(RAYS) + 0.5) * math.tau / RAYS
         self._directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
+        self._last: tuple[object, Walls] | None = None
 
     def visible_cells(self, low: Points, high: Points, far: float) -> Cells:
         """Cells that can be seen from anywhere in the rectangle from low (2,) to high (2,), up to far, in m; with the
         cells around them."""
-        walls = self._walls(np.maximum(low - far, self._low), np.minimum(high + far, self._high))
+        lowest, highest = np.maximum(low - far, self._low), np.minimum(high + far, self._high)
+        walls = self._walls_of_block(lowest, highest)
         (x0, y0), (x1, y1) = low, high
         eyes = np.array([(x0, y0), (x1, y0), (x0, y1), (x1, y1), ((x0 + x1) / 2, (y0 + y1) / 2)])
-        eyes = eyes[~walls.at(eyes)]
-        s = np.arange(0.0, far, STEP)[:, None]
-        points = eyes[:, None, None] + s * self._directions[:, None]  # (eyes, rays, steps, 2)
-        hidden = np.maximum.accumulate(walls.at(points), axis=2)
-        seen = np.zeros(np.array(walls.pixels.shape) // int(CELL / PIXEL) + 2, dtype=bool)
-        column, row = np.moveaxis(((points[~hidden] - walls.origin) / CELL).astype(np.int64), -1, 0)
-        inside = (column >= 0) & (column < seen.shape[1] - 2) & (row >= 0) & (row < seen.shape[0] - 2)
-        seen[row[inside] + 1, column[inside] + 1] = True
+        origin = np.floor(lowest / CELL) * CELL
+        columns, rows = np.maximum(np.ceil((highest - origin) / CELL), 1).astype(int)
+        seen = np.zeros((rows + 2, columns + 2), dtype=bool)
+        _look_around(eyes, self._directions, far, walls, origin, seen)
         seen = binary_dilation(seen, np.ones((3, 3)))  # walls that were hit, and what stands out of its own cell
-        rows, columns = np.nonzero(seen)
-        return np.asarray(np.stack((columns, rows), axis=1) - 1 + np.rint(walls.origin / CELL).astype(np.int64))
+        found_rows, found_columns = np.nonzero(seen)
+        found = np.stack((found_columns, found_rows), axis=1)
+        return np.asarray(found - 1 + np.rint(origin / CELL).astype(np.int64))
 
-    def _walls(self, low: Points, high: Points) -> _Walls:
-        """The map of the rectangle from low (2,) to high (2,), in m."""
-        origin = np.floor(low / CELL) * CELL
+    def _walls_of_block(self, low: Points, high: Points) -> Walls:
+        """The map of a block around the rectangle from low (2,) to high (2,), in m; whoever drives on stays in it."""
+        block = tuple(np.floor(low / BLOCK).tolist()), tuple(np.ceil(high / BLOCK).tolist())
+        if self._last is None or self._last[0] != block:
+            self._last = block, self._walls(np.array(block[0]) * BLOCK, np.array(block[1]) * BLOCK)
+        return self._last[1]
+
+    def _walls(self, origin: Points, high: Points) -> Walls:
+        """The map of the rectangle from its origin (2,), of whole cells, to high (2,), in m."""
         columns, rows = np.maximum(np.ceil((high - origin) / CELL), 1).astype(int) * int(CELL / PIXEL)
         picture = Image.new("L", (int(columns), int(rows)), 0)
         draw = ImageDraw.Draw(picture)
-        near = (self._highest >= low).all(axis=1) & (self._lowest <= high).all(axis=1)
+        near = (self._highest >= origin).all(axis=1) & (self._lowest <= high).all(axis=1)
         for house in self._houses[near]:
             draw.polygon([(float(x), float(y)) for x, y in (house - origin) / PIXEL - 0.5], fill=1, outline=1)
-        return _Walls(origin, np.asarray(picture) > 0)
+        return Walls(origin, np.asarray(picture) > 0)
 
 
-class _Walls(NamedTuple):
-    """A map of walls from its origin (2,) in m on, in pixels of PIXEL m (rows, columns)."""
+@compiled
+def _look_around(
+    eyes: Points, directions: Points, far: float, walls: Walls, origin: Points, seen: NDArray[np.bool_]
+) -> None:
+    """Writes which cells from an origin (2,) on are seen from some eyes (N, 2) that are in no building; seen has an
+    empty cell around it."""
+    rows, columns = seen.shape[0] - 2, seen.shape[1] - 2
+    for eye in range(len(eyes)):
+        for ray in range(len(directions)):
+            for k in range(math.ceil(far / STEP)):
+                x, y = eyes[eye, 0] + k * STEP * directions[ray, 0], eyes[eye, 1] + k * STEP * directions[ray, 1]
+                if _is_wall(walls, x, y):
+                    break
+                column, row = int((x - origin[0]) / CELL), int((y - origin[1]) / CELL)
+                if 0 <= column < columns and 0 <= row < rows:
+                    seen[row + 1, column + 1] = True
 
-    origin: Points
-    pixels: NDArray[np.bool_]
 
-    def at(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether points (..., 2) lie in a building; those beyond the map do not."""
-        column, row = np.moveaxis(((points - self.origin) / PIXEL).astype(np.int32), -1, 0)
-        rows, columns = self.pixels.shape
-        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-        return np.asarray(self.pixels[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)] & inside)
+@inlined
+def _is_wall(walls: Walls, x: float, y: float) -> bool:
+    """Whether a place lies in a building; those beyond the map do not."""
+    column, row = int((x - walls.origin[0]) / PIXEL), int((y - walls.origin[1]) / PIXEL)
+    rows, columns = walls.pixels.shape
+    return bool(0 <= column < columns and 0 <= row < rows and walls.pixels[row, column])

@@ -35,7 +35,7 @@ TO_LINE = math.sqrt(2 * LINE / ACCELERATION)  # s
 SEEN = 7.2  # m from the ego's bumper to the car's middle within which it is in A2
 SLOWEST, FASTEST = 2.5, 7.5  # m/s of an ego before which somebody pulls out
 STANDS, AFTER = 0.3, 1.5  # m/s below which the ego stands, and s for which it has to before the car goes on
-FARTHEST = 30.0  # m from the ego, beyond which nobody who is parked begins
+FARTHEST = 30.0  # m from the ego along an axis beyond which nobody who is parked begins
 OTHERS = 14.0  # m around it within which no other car may drive
 GONE = 5.0  # m that the ego is past its front when it may follow
 
@@ -70,17 +70,10 @@ class ParkedCar:
     """m/s."""
     stood: float = 0.0
     """s for which the ego has stood before it."""
-    _last: tuple[float, float, VehicleState] | None = None
-    """Its way and speed when it was last looked at, and what was seen: nearly all stand."""
 
     @property
     def state(self) -> VehicleState:
         """As the world sees it."""
-        if self._last is None or self._last[:2] != (self.way, self.speed):
-            self._last = self.way, self.speed, self._state()
-        return self._last[2]
-
-    def _state(self) -> VehicleState:
         share = min(self.way / WAY, 1.0)
         left = -BESIDE * (1 - share * share * (3 - 2 * share))
         turn = math.atan(BESIDE * 6 * share * (1 - share) / WAY)
@@ -120,6 +113,7 @@ class ParkedCars:
             car = ParkedCar(f"parked{k}", length, width, lane, s, willing=bool(rng.random() < WILLING))
             if len(self.cars) < n and self._is_free(car, ego, near):
                 self.cars.append(car)
+        self._look()
 
     def _is_free(self, car: ParkedCar, ego: VehicleState, near: Callable[[Pose, float], list[Obstacle]]) -> bool:
         here = car.state.pose
@@ -131,17 +125,26 @@ class ParkedCars:
             boxes_overlap(box, box_corners(thing.pose, thing.length, thing.width)) for thing in near(here, car.length)
         )
 
+    def _look(self) -> None:
+        """Takes down where they are, which changes only where one moves."""
+        self._states = tuple(car.state for car in self.cars)
+        self._places = np.array([(state.pose.x, state.pose.y) for state in self._states]).reshape(-1, 2)
+
     def states(self) -> tuple[VehicleState, ...]:
         """All that are still there."""
-        return tuple(car.state for car in self.cars)
+        return self._states
 
     def step(self, dt: float, ego: VehicleState, others: Sequence[VehicleState]) -> list[ParkedCar]:
         """Moves them on by dt seconds; returns those that have left and drive in their lane from now on. others: all
         that drive."""
-        for car in self.cars:
-            _move(car, dt, ego, others)
+        away = np.abs(self._places - (ego.pose.x, ego.pose.y)).max(axis=1, initial=0.0).tolist()
+        for car, distance in zip(self.cars, away, strict=True):
+            if distance <= FARTHEST or car.stage is not Stage.PARKED:
+                _move(car, dt, ego, others)
         gone = [car for car in self.cars if car.way >= WAY]
-        self.cars = [car for car in self.cars if car.way < WAY]
+        if any(car.stage is not Stage.PARKED for car in self.cars):
+            self.cars = [car for car in self.cars if car.way < WAY]
+            self._look()
         return gone
 
 
@@ -162,9 +165,6 @@ def _move(car: ParkedCar, dt: float, ego: VehicleState, others: Sequence[Vehicle
     if car.stage is Stage.PARKED and not car.willing:
         return
     state = car.state
-    x, y = state.pose.x - ego.pose.x, state.pose.y - ego.pose.y
-    if car.stage is Stage.PARKED and max(abs(x), abs(y)) > FARTHEST:
-        return
     ahead, left = to_local(moved(ego.pose, forward=ego.length / 2), np.array((state.pose.x, state.pose.y))).tolist()
     along = abs(wrap_angle(ego.pose.heading - car.lane.line.heading_at(car.s))) < 0.3
     if car.stage is Stage.PARKED:

@@ -141,8 +141,10 @@ def _look(boxes: Points, at: Junctions) -> tuple[NDArray[np.bool_], NDArray[np.b
 @compiled
 def _waits(car: Points, stop: Points, heading: float) -> bool:
     """Whether a car (3,) waits at a stop line (2,)."""
-    c, s = math.cos(heading), math.sin(heading)
     dx, dy = car[0] - stop[0], car[1] - stop[1]
+    if max(abs(dx), abs(dy)) > LOOP + HALF_CAR + LOOP_HALF_WIDTH:
+        return False
+    c, s = math.cos(heading), math.sin(heading)
     ahead, left = dx * c + dy * s, dy * c - dx * s
     near = -LOOP - HALF_CAR < ahead < JUST_BEYOND and abs(left) < LOOP_HALF_WIDTH
     return near and math.cos(car[2] - heading) > SAME_WAY
