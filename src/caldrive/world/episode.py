@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from caldrive.datatypes import DT, Contact, Control, PedestrianState, VehicleState
-from caldrive.geometry import moved, positions
+from caldrive.geometry import boxes_of, moved, positions
 from caldrive.scenarios import Scenario
 from caldrive.timing import Timed, untimed
 from caldrive.world.roads.route import Route
@@ -71,15 +71,16 @@ class Episode:
         before = self.state
         self._ego = advance(self._ego, control, DT, self.vehicle)
         time, ego = round(before.time + DT, 6), self._ego_box()
+        boxes = boxes_of((ego, *before.vehicles))
         with self._timed("lights"):
-            self._lights.step(time, (ego, *before.vehicles))
+            self._lights.step(time, boxes)
         if self._traffic is not None:
             with self._timed("traffic (SUMO)"):
                 for car in self._parked.step(DT, ego, before.vehicles):
                     self._traffic.take_over(car.state, car.lane, car.s + car.way)
                 self._traffic.step(time, ego, before.pedestrians)
         with self._timed("pedestrians"):
-            self._pedestrians.step(DT, [ego, *before.vehicles], self._curvature())
+            self._pedestrians.step(DT, boxes, self._curvature())
             people = self._pedestrians.states()
         with self._timed("contacts"):
             contacts = self._resolve_contacts((*self._cars(before.progress), *people))

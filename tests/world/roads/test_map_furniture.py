@@ -10,6 +10,7 @@ import pytest
 import shapely
 
 from caldrive.datatypes import LightState, VehicleState
+from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.scene.scenery import Prop, build_scenery
@@ -75,7 +76,7 @@ def test_lanes_side_by_side_have_one_post_and_the_same_light(tmp_path: Path) -> 
     lights = TrafficLights(roads, np.random.default_rng(0))
     for k in range(300):
         cars = [VehicleState(roads.lanes["-1_1"].line.pose_at(96.0))]
-        lights.step(k / 10, cars)
+        lights.step(k / 10, boxes_of(cars))
         assert len({light.state for light in lights.states()}) == 1
     assert lights.states()[0].state is LightState.GREEN
     for post in roads.posts:

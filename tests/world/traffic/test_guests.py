@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from caldrive.datatypes import VehicleState
-from caldrive.geometry import to_local
+from caldrive.geometry import boxes_of, to_local
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.traffic.traffic_lights import TrafficLights
 from caldrive.world.traffic.vehicles import Traffic
@@ -32,7 +32,7 @@ def test_cars_stop_behind_a_guest_and_drive_on_when_it_has_gone(town01: RoadNetw
     assert 4.0 < behind < 35.0
     for k in range(200, 260):
         traffic.guests.update([])
-        lights.step(k * DT, traffic.cars)
+        lights.step(k * DT, boxes_of(traffic.cars))
         traffic.step(k * DT, None, ())
     now = next(car for car in traffic.cars if car.id == name)
     assert np.hypot(now.pose.x - first.pose.x, now.pose.y - first.pose.y) > 5.0

@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from caldrive.datatypes import PedestrianState, Pose, VehicleState
+from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.traffic.pedestrians import Pedestrians
 from caldrive.world.traffic.sidewalks import find_sidewalks
@@ -21,7 +22,7 @@ Walk = list[tuple[PedestrianState, ...]]
 def walk(people: Pedestrians, seconds: float, cars: list[VehicleState] | None = None) -> Walk:
     states = []
     for _ in range(round(seconds / DT)):
-        people.step(DT, cars or [FAR])
+        people.step(DT, boxes_of(cars or [FAR]))
         states.append(people.states())
     return states
 
@@ -124,7 +125,7 @@ def test_nobody_at_all_is_fine(town02: RoadNetwork) -> None:
 def test_people_walk_in_a_town_without_cars(town02: RoadNetwork) -> None:
     group = people(town02, 30, crossing=50.0)
     for _ in range(100):
-        group.step(DT, [])
+        group.step(DT, boxes_of(()))
     assert len(group.states()) == 30
 
 
@@ -135,7 +136,7 @@ def test_nobody_is_run_over_on_a_street_where_a_fast_car_drives_up_and_down(town
         pose = lane.pose_at((i * 1.2) % lane.length)
         ego = VehicleState(pose, 12.0, length=4.2, width=1.8)
         before = group.walkers.on_road.copy()
-        group.step(DT, [ego])
+        group.step(DT, boxes_of([ego]))
         c, s = math.cos(pose.heading), math.sin(pose.heading)
         d = group.walkers.position - (pose.x, pose.y)
         stepped = group.walkers.on_road & ~before & (np.abs(-s * d[:, 0] + c * d[:, 1]) < 2.0)

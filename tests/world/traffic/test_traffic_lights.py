@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from caldrive.datatypes import LightState, VehicleState
-from caldrive.geometry import moved
+from caldrive.geometry import boxes_of, moved
 from caldrive.world.roads.network import LightPost, RoadNetwork
 from caldrive.world.traffic.traffic_lights import (
     LONGEST_CLEARING,
@@ -127,7 +127,7 @@ def state_of(lights: TrafficLights, post: LightPost) -> LightState:
 def drive(lights: TrafficLights, cars: list[VehicleState], seconds: float) -> list[tuple[LightState, ...]]:
     history = []
     for i in range(round(seconds / DT)):
-        lights.step((i + 1) * DT, cars)
+        lights.step((i + 1) * DT, boxes_of(cars))
         history.append(tuple(light.state for light in lights.states()))
     return history
 
@@ -185,7 +185,7 @@ def test_a_town_without_lights_has_nothing_to_show() -> None:
     from types import SimpleNamespace
 
     lights = TrafficLights(SimpleNamespace(posts=()), np.random.default_rng(0))  # type: ignore[arg-type]
-    lights.step(0.1, [])
+    lights.step(0.1, boxes_of(()))
     assert lights.states() == ()
 
 
@@ -194,7 +194,7 @@ def test_where_no_cars_drive_lights_turn_for_those_whom_nobody_sees(town01: Road
         """Phases that end in five minutes."""
         lights, seen = TrafficLights(town01, np.random.default_rng(0), demand), list[object]()
         for k in range(3000):
-            lights.step(0.1 * k, [])
+            lights.step(0.1 * k, boxes_of(()))
             seen.append(tuple(junction.phase for junction in lights.junctions.values()))
         return sum(before != after for before, after in pairwise(seen))
 
@@ -206,7 +206,7 @@ def test_with_unseen_demand_no_light_stays_red_for_long(town01: RoadNetwork) -> 
     lights, reds = TrafficLights(town01, np.random.default_rng(1), demand=1 / 45), list[int]()
     since = np.zeros(len(lights.states()), dtype=int)
     for k in range(6000):
-        lights.step(0.1 * k, [])
+        lights.step(0.1 * k, boxes_of(()))
         is_red = np.array([light.state is RED for light in lights.states()])
         reds += since[~is_red & (since > 0)].tolist()
         since = np.where(is_red, since + 1, 0)

@@ -13,7 +13,7 @@ import pytest
 from shapely import LineString
 
 from caldrive.datatypes import LightState, PedestrianState, Pose, TrafficLight, VehicleState
-from caldrive.geometry import box_corners, boxes_overlap, moved, to_local, wrap_angle
+from caldrive.geometry import box_corners, boxes_of, boxes_overlap, moved, to_local, wrap_angle
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.traffic.start_places import room
 from caldrive.world.traffic.sumo_process import stop_sumo
@@ -59,7 +59,7 @@ def drive(
     snapshots = []
     for i in range(round(seconds / DT)):
         time = round((i + 1) * DT, 6)
-        lights.step(time, (ego, *traffic.cars))
+        lights.step(time, boxes_of((ego, *traffic.cars)))
         traffic.step(time, ego, people(traffic.cars))
         snapshots.append(Snapshot(time, traffic.cars, lights.states()))
     return snapshots

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from caldrive.datatypes import DT, PedestrianState, Pose, VehicleState
-from caldrive.geometry import wrap_angle
+from caldrive.geometry import boxes_of, wrap_angle
 from caldrive.world.roads.network import RoadNetwork
 from caldrive.world.traffic.pedestrians import Pedestrians
 from caldrive.world.traffic.traffic_lights import TrafficLights
@@ -47,12 +47,12 @@ class Population:
             self._time = round(self._time + DT, 6)
             before = self._cars, self._walkers
             everyone = [*guests, *self._cars]
-            self.lights.step(self._time, everyone)
+            self.lights.step(self._time, boxes_of(everyone))
             if self._traffic is not None:
                 self._traffic.guests.update(guests)
                 self._traffic.step(self._time, None, [*self._walkers, *walkers])
                 self._cars = self._traffic.cars
-            self._people.step(DT, everyone)
+            self._people.step(DT, boxes_of(everyone))
             self._walkers = self._people.states()
             self._before = before
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from caldrive.compiled import compiled, inlined
-from caldrive.datatypes import PedestrianState, Points, Pose, VehicleState
+from caldrive.datatypes import PedestrianState, Points, Pose
 from caldrive.geometry import boxes_of
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.traffic.gap_acceptance import Cars, bumps, foreseen, is_clear, may_walk, watched
@@ -102,6 +102,7 @@ class Pedestrians:
             crossing_pace=np.zeros(n), start=np.zeros((n, 2)), end=np.zeros((n, 2)),
         )  # fmt: skip
         self.crossing: list[Crossing | None] = [None] * n
+        self._crosses = np.zeros(n, dtype=bool)  # who has one
         everywhere = self.sidewalks.crossings if n else []
         self._ways = [_along(ways) for ways in everywhere]
         self._screened = [_along(_screened(ways, screens)) for ways in everywhere]
@@ -110,12 +111,12 @@ class Pedestrians:
         self._hiding: set[int] = set()  # those who look for something to come from behind
         walk_on(self.walkers, self.sidewalks.loops, np.arange(n), dt=0.0)
 
-    def step(self, dt: float, cars: Sequence[VehicleState], curvature: float = 0.0) -> None:
-        """Everybody walks on for dt seconds. cars: the ego first; curvature: of its path, 1/m."""
-        self._cars = Cars(boxes_of(cars), *foreseen(self._path, curvature))
+    def step(self, dt: float, cars: Floats, curvature: float = 0.0) -> None:
+        """Everybody walks on for dt seconds. cars: see `geometry.boxes_of`, the ego first; curvature: of its path,
+        1/m."""
+        self._cars = Cars(cars, *foreseen(self._path, curvature))
         self._path = watched(self._path, curvature, dt)
-        starts = self.rng.random(self.n) < self.rate * dt
-        crossing = np.array([way is not None for way in self.crossing], dtype=bool)
+        starts, crossing = self.rng.random(self.n) < self.rate * dt, self._crosses.copy()
         who = np.flatnonzero(crossing)
         if len(who):
             arrived, kerb = np.zeros(len(who), np.bool_), np.zeros(len(who), np.bool_)
@@ -151,7 +152,7 @@ class Pedestrians:
 
     def _take(self, k: int, way: Crossing | None) -> None:
         """Somebody crosses on a way from now on, or on none."""
-        self.crossing[k], self.walkers.waited[k] = way, 0.0
+        self.crossing[k], self._crosses[k], self.walkers.waited[k] = way, way is not None, 0.0
         if way is not None:
             self.walkers.start[k], self.walkers.end[k] = way.start, way.end
 
@@ -160,7 +161,7 @@ class Pedestrians:
         way, walkers = self.crossing[k], self.walkers
         assert way is not None
         if arrived:
-            self.crossing[k] = None
+            self._take(k, None)
             walkers.loop[k], walkers.s[k], walkers.offset[k], walkers.on_road[k] = way.end_loop, way.end_s, 0.0, False
             walkers.direction[k] = self.rng.choice([-1.0, 1.0])
             walk_on(walkers, self.sidewalks.loops, np.array([k]), dt=0.0)
@@ -170,8 +171,7 @@ class Pedestrians:
     def states(self) -> tuple[PedestrianState, ...]:
         """Everybody as of now."""
         walkers = self.walkers
-        crossing = np.array([way is not None for way in self.crossing], dtype=bool)
-        pace = np.where(crossing, walkers.crossing_pace, walkers.pace)
+        pace = np.where(self._crosses, walkers.crossing_pace, walkers.pace)
         speeds = np.where(walkers.walking, pace, 0.0).tolist()
         numbers = walkers.position.tolist(), walkers.heading.tolist(), speeds, walkers.on_road.tolist(), self.names
         return tuple(

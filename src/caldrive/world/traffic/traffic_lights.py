@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caldrive.compiled import compiled
-from caldrive.datatypes import LightState, Points, TrafficLight, VehicleState
-from caldrive.geometry import boxes_of
+from caldrive.datatypes import LightState, Points, TrafficLight
 from caldrive.world.roads.network import LightPost, RoadNetwork
 
 SHORTEST_GREEN, LONGEST_GREEN = 3.0, 5.0  # s
@@ -191,11 +190,11 @@ class TrafficLights:
         """Junctions that stay as they are."""
         self._unseen = np.zeros(sum(len(junction.posts) for junction in self.junctions.values()), dtype=bool)
 
-    def step(self, time: float, cars: Iterable[VehicleState]) -> None:
-        """Moves all junctions on to a time (s), given everybody who drives."""
+    def step(self, time: float, cars: NDArray[np.float64]) -> None:
+        """Moves all junctions on to a time (s). cars: everybody who drives, see `geometry.boxes_of`."""
         if self._at is None:
             return
-        waiting, occupied = _look(boxes_of(cars), self._at)
+        waiting, occupied = _look(cars, self._at)
         if self.demand:
             self._unseen |= self.rng.random(len(self._unseen)) < self.demand * (time - self._time)
             self._unseen &= ~np.array([state is LightState.GREEN for state in self._shown()], dtype=bool)
