@@ -8,6 +8,7 @@ them from behind a tree or a car that is parked.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -34,7 +35,7 @@ PATIENCE = 5.0  # s of waiting at the kerb before walking on, or on the road bef
 KERB = 1.2  # m from the middle of the sidewalk
 NO_WAY = 1e-9  # m: as good as there
 Flags = NDArray[np.bool_]
-Along = tuple[Floats, Sequence[Crossing]]  # crossings from a sidewalk, and where each begins, m along it
+Along = tuple[list[float], list[Crossing]]  # where crossings from a sidewalk begin, m along it, and these
 NO_SCREENS = np.zeros((0, 2))
 
 
@@ -145,10 +146,12 @@ class Pedestrians:
     def _look_for_a_way(self, k: int, ways: Sequence[Along]) -> None:
         """Somebody crosses if one of these ways begins here, and no car stands in it."""
         along, crossings = ways[self.walkers.loop[k]]
-        near = np.flatnonzero(np.abs(along - self.walkers.s[k]) < CROSSING_REACH)
-        if len(near) and is_clear(self.walkers.position[k], crossings[near[0]].end, self._cars):
+        s = self.walkers.s[k]
+        near = bisect_right(along, s - CROSSING_REACH)
+        is_here = near < len(along) and along[near] < s + CROSSING_REACH
+        if is_here and is_clear(self.walkers.position[k], crossings[near].end, self._cars):
             self._hiding.discard(k)
-            self._take(k, crossings[near[0]])
+            self._take(k, crossings[near])
 
     def _take(self, k: int, way: Crossing | None) -> None:
         """Somebody crosses on a way from now on, or on none."""
@@ -181,7 +184,8 @@ class Pedestrians:
 
 
 def _along(ways: Sequence[Crossing]) -> Along:
-    return np.array([way.s for way in ways]), ways
+    ordered = sorted(ways, key=lambda way: way.s)
+    return [way.s for way in ordered], ordered
 
 
 def _screened(ways: Sequence[Crossing], screens: Points) -> list[Crossing]:
