@@ -74,8 +74,8 @@ class OcclusionMap:
         picture = Image.new("L", (int(columns), int(rows)), 0)
         draw = ImageDraw.Draw(picture)
         near = (self._highest >= origin).all(axis=1) & (self._lowest <= high).all(axis=1)
-        for house in self._houses[near]:
-            draw.polygon([(float(x), float(y)) for x, y in (house - origin) / PIXEL - 0.5], fill=1, outline=1)
+        for house in ((self._houses[near] - origin) / PIXEL - 0.5).reshape(-1, 8).tolist():
+            draw.polygon(house, fill=1, outline=1)
         return Walls(origin, np.asarray(picture) > 0)
 
 

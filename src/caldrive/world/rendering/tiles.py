@@ -128,8 +128,9 @@ class TileGrid:
         distance[level == NO_TILE] = np.inf
         chosen = np.flatnonzero(drawn)
         chosen = chosen[np.argsort(distance[chosen], kind="stable")]
-        ranges = [np.arange(self.bounds[k], self.bounds[k + 1]) for k in chosen]
-        return self.faces.take(np.concatenate(ranges) if ranges else np.zeros(0, np.int64))
+        sizes = self.bounds[chosen + 1] - self.bounds[chosen]
+        before = np.cumsum(sizes) - sizes  # how many faces the tiles before have
+        return self.faces.take(np.arange(sizes.sum()) + np.repeat(self.bounds[chosen] - before, sizes))
 
 
 def _key(cells: Cells) -> NDArray[np.int64]:
