@@ -11,7 +11,7 @@ import shapely
 from caldrive.datatypes import Control, Pose, VehicleState
 from caldrive.geometry import box_corners, boxes_of
 from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
-from caldrive.world.traffic.gap_acceptance import Cars, bumps, is_clear, may_walk
+from caldrive.world.traffic.gap_acceptance import Cars, bumps, foreseen, is_clear, may_walk, watched
 
 
 def may(
@@ -120,6 +120,22 @@ def test_whoever_is_before_a_car_may_leave(speed: float, left: float) -> None:
     cars, place = Cars(boxes_of([car(speed)])), np.array((2.1 + 0.3, left))
     assert not bumps(place, (0.0, -0.14), cars)
     assert bumps(place, (0.0, 0.14), cars)
+
+
+def test_an_unsteady_driver_is_no_reason_to_be_careful() -> None:
+    """Or the test would be easier for those who drive worse."""
+    lately, place = 0.0, np.array((2.1 + 6.0, -2.06))
+    for k in range(40):
+        curvature = math.tan(0.03) / 2.6 * (-1) ** k
+        path = foreseen(lately, curvature)
+        assert may_walk(place, (0.0, 0.2), 1.2, Cars(boxes_of([car(5.5)]), *path), True)
+        lately = watched(lately, curvature, 0.1)
+
+
+def test_people_expect_no_turn_beyond_the_wheels_and_none_to_the_other_side_as_they_come_back() -> None:
+    assert foreseen(0.0, 0.27)[1] == pytest.approx(0.27)
+    assert foreseen(0.27, 0.05)[1] == 0.0
+    assert foreseen(-0.02, 0.1)[1] > 0.1
 
 
 TURN = 1 / 8.0  # 1/m

@@ -62,7 +62,7 @@ class OcclusionMap:
         return np.asarray(found - 1 + np.rint(origin / CELL).astype(np.int64))
 
     def _walls_of_block(self, low: Points, high: Points) -> Walls:
-        """The map of a block around the rectangle from low (2,) to high (2,), in m; whoever drives on stays in it."""
+        """The map of a block around the rectangle from low (2,) to high (2,), in m; a drive seldom leaves it."""
         block = tuple(np.floor(low / BLOCK).tolist()), tuple(np.ceil(high / BLOCK).tolist())
         if self._last is None or self._last[0] != block:
             self._last = block, self._walls(np.array(block[0]) * BLOCK, np.array(block[1]) * BLOCK)

@@ -1,7 +1,8 @@
 """When people step in front of cars. The careful accept a gap in which a driver who keeps to the limit can still stop
 for them, or has passed, or is slow; in front of a fast car they wait. The bold misjudge the ego: they step out in front
 of it as soon as a driver who brakes at once can just stop. So who looks can always avoid them, and who does not cannot.
-Before an ego that turns nobody is bold, and in a tight turn, where it looks past its path, nobody enters that at all.
+Before an ego that turns nobody is bold, and in a tight turn, where it looks past its path, nobody enters that as long
+as it could be there before they have left.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ STRAIGHT = 0.02  # 1/m: less curved paths are as good as straight
 CROSSES = 2.0  # s that somebody takes to leave the way of a car
 TIGHT = 0.05  # 1/m: on a path that curves so much a driver who looks straight ahead sees nobody early enough
 STEPS_OVER = 0.4  # m from one look along a way to the next
-MEMORY, FORESIGHT = 0.5, 1.0  # s: from how the ego's path bent lately people see how it will
+MEMORY, FORESIGHT = 0.5, 1.0  # s over which people average the bend of the ego's path, and s that they look ahead
+SHARPEST = 0.27  # 1/m: the ego's wheels turned as far as they go
 Floats = NDArray[np.float64]
 
 
@@ -55,8 +57,11 @@ def watched(lately: float, curvature: float, dt: float) -> float:
 
 
 def foreseen(lately: float, curvature: float) -> tuple[float, float]:
-    """The curvature (1/m) of the ego's path, and that which people expect in a moment if it goes on turning so."""
-    return curvature, curvature + (curvature - lately) * FORESIGHT / MEMORY
+    """The curvature (1/m) of the ego's path, and that which people expect in a moment if its wheels go on turning so;
+    who turns them back is expected to drive straight on."""
+    soon = curvature + (curvature - lately) * FORESIGHT / MEMORY
+    turns_back = soon * lately < 0 and abs(curvature) <= abs(lately)
+    return curvature, 0.0 if turns_back else min(max(soon, -SHARPEST), SHARPEST)
 
 
 @compiled
@@ -65,7 +70,8 @@ def may_walk(position: Points, way: tuple[float, float], pace: float, cars: Cars
     then is beside them or can neither stop nor pass. is_bold: in front of the ego, unless it turns."""
     for look in range(_looks(cars)):
         car, curvature = _looked_at(cars, look)
-        is_bold_now = is_bold and car == EGO and abs(curvature) < STRAIGHT
+        straight = STRAIGHT if look == car else TIGHT  # a driver whose steering is unsteady is not about to turn
+        is_bold_now = is_bold and car == EGO and abs(curvature) < straight
         if _is_too_near(position, way, pace, cars.boxes[car], curvature, is_bold_now):
             return False
     return True
@@ -74,7 +80,8 @@ def may_walk(position: Points, way: tuple[float, float], pace: float, cars: Cars
 @compiled
 def bumps(position: Points, step: tuple[float, float], cars: Cars) -> bool:
     """Whether a step (x, y in m) leads somebody (2,) into a car, or in front of one that would reach them even if it
-    braked fully: a car that turns may come to be before people who have entered no corridor, and beside them."""
+    braked fully, or in a tight turn if it did not: a car that turns may come to be before people who have entered no
+    corridor, and beside them."""
     for look in range(_looks(cars)):
         car, curvature = _looked_at(cars, look)
         if _is_bumped(position, step, cars.boxes[car], curvature):
@@ -133,8 +140,8 @@ def _is_too_near(
         return False
     if is_bold:
         return _cannot_stop_at_once(then, speed, taken)
-    is_surprised = _is_unseen(position, box, curvature) and then < speed * taken + MAY_GAIN * taken * taken / 2
-    return bool(is_surprised or _cannot_stop(then, arrives, speed, taken))
+    is_there_first = then < speed * taken + MAY_GAIN * taken * taken / 2
+    return bool((is_there_first and _is_unseen(position, box, curvature)) or _cannot_stop(then, arrives, speed, taken))
 
 
 @inlined
@@ -151,8 +158,9 @@ def _is_bumped(position: Points, step: tuple[float, float], box: Floats, curvatu
     body = _body(left, half, curvature)
     is_near = -2 * half - TOUCH < ahead < reach and abs(left) < body
     will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < _body(then_left, half, curvature)
-    still_beside = ahead < TOUCH or abs(left) > body - DRIFT
-    return bool(will_be and (not is_near or (still_beside and abs(then_left) < abs(left))))
+    # Who is before a car goes on, so as to leave; but nobody comes nearer to one that is beside them, or nearly past.
+    may_stay = ahead < TOUCH or abs(left) > body - DRIFT
+    return bool(will_be and (not is_near or (may_stay and abs(then_left) < abs(left))))
 
 
 @inlined
