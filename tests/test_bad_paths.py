@@ -133,8 +133,12 @@ def test_a_place_that_cannot_be_written_to_is_named(
         (OSError(errno.ENOSPC, "No space left on device"), "no room on the disk"),
         (MemoryError(), "too little memory"),
         (
-            ImportError("libXext.so.6: cannot open shared object file: No such file or directory"),
-            "found no libXext.so.6 on this machine, wanted it for SUMO: on Debian type apt-get install libgl1",
+            ImportError("libXext.so.6: cannot open shared object file: No such file", name="libsumo._libsumo"),
+            "found no libXext.so.6 on this machine, wanted it for libsumo._libsumo: on Debian type apt-get install",
+        ),
+        (
+            ImportError("libtbb.so.12: cannot open shared object file: No such file", name="openvino"),
+            "found no libtbb.so.12 on this machine, wanted it for openvino: install it",
         ),
         (ZeroDivisionError("division by zero"), "a fault of the program (ZeroDivisionError: division by zero)"),
         (RecursionError("maximum recursion depth exceeded"), "a fault of the program (RecursionError"),

@@ -30,7 +30,7 @@ DESCRIPTION = (
     "Conditional Affordance Learning for urban driving: one camera, six affordances, one controller. "
     "caldrive --version says which caldrive this is."
 )
-SHARED = "apt-get install libgl1 libxext6 libxrender1 libatomic1"  # what SUMO needs and small containers lack
+SHARED = "apt-get install libgl1 libxext6 libxrender1 libatomic1"  # on Debian, what SUMO needs and containers lack
 FULL = (errno.ENOSPC, errno.EDQUOT)
 FAILED, STOPPED = 2, 130  # exit codes
 LONGEST_WORD = 1000  # letters of it that an error shows
@@ -167,7 +167,8 @@ def _sentence(error: Exception) -> str:
         name = error.filename or "a file or folder"
         return f"found that {name} is no use ({error.strerror.lower()}), wanted one that is: give another"
     if isinstance(error, ImportError) and (missing := re.match(r"(\S+): cannot open shared object file", text)):
-        return f"found no {missing[1]} on this machine, wanted it for SUMO: on Debian type {SHARED}"
+        how = f"on Debian type {SHARED}" if "sumo" in (error.name or "") else "install it"
+        return f"found no {missing[1]} on this machine, wanted it for {error.name or 'a library'}: {how}"
     if isinstance(error, MemoryError):
         return "found too little memory for this, wanted more: ask for less, or close other programs"
     if isinstance(error, RuntimeError) and text.startswith("Symlink loop"):  # before Python 3.13

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -14,8 +16,10 @@ import caldrive.gym
 from caldrive.agents.reinforcement.config import CARLA2017, N_COMMANDS
 from caldrive.agents.reinforcement.inputs import control_of
 from caldrive.datatypes import CameraConfig, Command, Control, Pose
+from caldrive.driving.referee import Referee
 from caldrive.gym import DrivingEnv, EnvConfig
-from caldrive.results import InfractionKind
+from caldrive.gym.env import _broken
+from caldrive.results import Infraction, InfractionKind
 from caldrive.scenarios import Scenario
 from tests.fakes import StraightRoad
 
@@ -98,7 +102,15 @@ def test_only_what_the_settings_name_terminates() -> None:
     assert truncated
     assert info["infractions"]
     assert info["cost"] == 0  # nothing more in the last action
-    assert not info["red_light"]
+
+
+def test_the_info_says_which_episode_it_is_and_what_was_broken(road: DrivingEnv) -> None:
+    _, info = road.reset(options={"scenario": replace(ROAD, seed=5)})
+    assert (info["env_seed"], info["red_light"], info["infractions"]) == (5, False, [])
+    referee = SimpleNamespace(infractions=[Infraction(InfractionKind.RED_LIGHT, time=1.0, x=0.0, y=0.0)])
+    found = _broken(cast(Referee, referee))
+    assert found["red_light"]
+    assert not found["crash"]
 
 
 def test_an_action_holds_for_some_steps_and_their_rewards_add_up(road: DrivingEnv) -> None:

@@ -1,4 +1,4 @@
-"""Where the network looks: class activation maps from gradients (section 5 of the paper), by one of two methods.
+"""Where the network looks: class activation maps from gradients (section 4.4 of the paper), by one of two methods.
 
 `gradcam` is the paper's (Selvaraju et al. 2017): the maps of the last convolution, each weighted by the mean of its
 gradient. `hirescam` (Draelos and Carin 2020) multiplies each place by its own gradient, so that a map shows what
@@ -172,8 +172,8 @@ def _outputs(network: Network, question: Question, images: Tensor) -> Tensor:
 
 
 def _evidence(network: Network, question: Question, target: int, images: Tensor) -> Tensor:
-    """What is looked for in the images, (1,): a value, or how much more speaks for a class than for all others. Its own
-    output says little where that of the others falls at the same places."""
+    """What is looked for in the images, (1,): a value, or how much more speaks for a class than for all others. One
+    class's output alone misses what only speaks against the others."""
     outputs = _outputs(network, question, images)
     if not question.spec.discrete:
         return outputs[:, target]

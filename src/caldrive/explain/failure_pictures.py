@@ -37,7 +37,7 @@ from caldrive.visualization.gauges import value_text
 if TYPE_CHECKING:  # who only reads what was drawn waits for no torch
     from caldrive.perception.network.network import Network
 
-FOLDER, VERSION = "attention", 1
+FOLDER, VERSION = "attention", 2
 MOST = 30  # failures that are drawn; more would not fit on a page
 STILL = replace(CameraConfig(), width=320, height=141)
 QUALITY = JPEG | {"quality": 65}

@@ -178,20 +178,14 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
     def _info(drive: _Drive) -> dict[str, Any]:
         """MetaDrive's keys where they apply, and our own."""
         truth, outcome, scenario = drive.truth, drive.referee.outcome, drive.referee.scenario
-        broken = {infraction.kind for infraction in drive.referee.infractions}
-        return {
+        return _broken(drive.referee) | {
             "is_success": outcome is Outcome.SUCCESS,
             "arrive_dest": outcome is Outcome.SUCCESS,
             "max_step": outcome is Outcome.TIMEOUT,
-            **{key: kind in broken for kind, key in COLLISION_KEYS.items()},
-            "crash": not broken.isdisjoint(COLLISION_KEYS),
-            "crash_sidewalk": InfractionKind.SIDEWALK in broken,
-            "red_light": InfractionKind.RED_LIGHT in broken,
             "left_route": drive.left_route,
             "out_of_road": truth.sidewalk_share > 0,
             "route_completion": min(1.0, max(0.0, truth.route_done / truth.route_length)),
             "speed": truth.ego.speed,
-            "infractions": [infraction.kind.value for infraction in drive.referee.infractions],
             "episode_reward": drive.reward,
             "episode_length": drive.length,
             "env_seed": scenario.seed,
@@ -199,3 +193,15 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
             "weather": scenario.weather,
             "task": scenario.task,
         }
+
+
+def _broken(referee: Referee) -> dict[str, Any]:
+    """What has been broken in an episode so far."""
+    kinds = [infraction.kind for infraction in referee.infractions]
+    return {
+        **{key: kind in kinds for kind, key in COLLISION_KEYS.items()},
+        "crash": any(kind in COLLISION_KEYS for kind in kinds),
+        "crash_sidewalk": InfractionKind.SIDEWALK in kinds,
+        "red_light": InfractionKind.RED_LIGHT in kinds,
+        "infractions": [kind.value for kind in kinds],
+    }

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 
+import msgspec
 import pytest
 
 from caldrive.carla_bridge.axes import Placement
 from caldrive.carla_bridge.server.actors import description
 from caldrive.carla_bridge.server.friction import FrictionVolume, friction_at, volume
 from caldrive.carla_bridge.server.layouts import PhysicsControl, VehicleControl, Wheel
+from caldrive.carla_bridge.server.server import Server
+from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.vehicles import Vehicle, physics_of, set_physics
 from caldrive.carla_bridge.server.wire import Refusal
+from caldrive.commands.serve_carla import make_server
 from caldrive.datatypes import Pose
 from caldrive.world.traffic.ego import EgoState
+from tests.carla_bridge.server.wire_client import WireClient, free_port
 
 FAST = 100 / 3.6  # m/s
 
@@ -83,6 +90,53 @@ def test_the_friction_of_a_volume_is_read_back_from_the_wheels_and_brakes() -> N
     assert after(car, BRAKE, 1.0).speed < FAST - 5.0
     car.friction_here = None
     assert [wheel.tire_friction for wheel in physics_of(car).wheels] == [0.0] * 4
+
+
+def test_who_gives_back_what_it_read_in_a_volume_has_its_own_friction_behind_it() -> None:
+    car = vehicle(friction=1.0)
+    car.friction_here = 3.1
+    set_physics(car, msgspec.structs.replace(physics_of(car), mass=900.0))
+    car.friction_here = None
+    assert [wheel.tire_friction for wheel in physics_of(car).wheels] == [1.0] * 4
+    assert car.physics.mass == 900.0
+
+
+@pytest.mark.parametrize("mass", [0.0, math.nan])
+def test_a_mass_that_cannot_be_is_refused_and_changes_nothing(mass: float) -> None:
+    car, steer = vehicle(), vehicle().config.max_steer
+    with pytest.raises(Refusal, match="found a mass"):
+        set_physics(car, PhysicsControl(mass=mass, wheels=(Wheel(max_steer_angle=70.0),) * 4))
+    assert car.config.max_steer == steer
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    made = make_server(ServerSettings(town="town01", port=free_port()))
+    yield made
+    made.close()
+
+
+def test_a_client_drives_through_a_volume_of_ice_and_loses_its_gravity(server: Server) -> None:
+    client = WireClient(server)
+    client.synchronous()
+    (x, y, _), (_, yaw, _) = client.call("get_map_info")[1][0]
+    number = client.spawn("vehicle.tesla.model3", (x, y, yaw))
+    client.spawn("static.trigger.friction", (x, y, yaw), friction="0.0", extent_x="400", extent_y="400", extent_z="400")
+    car = server.episode.get(number)
+    assert isinstance(car, Vehicle)
+    car.state, car.control = replace(car.state, speed=8.0), VehicleControl(brake=1.0)
+    client.call("tick_cue")
+    assert car.state.speed > 7.9
+    assert client.call("get_physics_control", number)[-2][0][0] == 0.0  # tire_friction of the first wheel
+    for _ in range(12):
+        client.call("tick_cue")
+    assert car.friction_here is None
+    assert car.state.speed < 7.0
+    car.state = replace(car.state, speed=8.0, brake_response=0.0)
+    client.call("set_actor_enable_gravity", number, False)
+    client.call("tick_cue")
+    assert car.state.speed > 7.9
+    client.leave()
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,14 @@ def test_whoever_is_announced_and_does_not_come_is_waited_for_only_a_moment(stre
     assert not streams.is_wanted(STREAM)
 
 
+def test_nobody_waits_for_those_who_were_announced_to_a_stream_that_has_ended(streams: Streams) -> None:
+    streams.announce(STREAM)
+    streams.close_stream(STREAM)
+    begin = time.monotonic()
+    streams.settle()
+    assert time.monotonic() - begin < 0.1
+
+
 def test_who_does_not_read_misses_messages_and_is_cut_off(
     streams: Streams, reader: socket.socket, said: list[str]
 ) -> None:

@@ -13,7 +13,18 @@ from caldrive.datatypes import KMH, Pose, VehicleState
 from caldrive.geometry import Polyline, box_corners, boxes_overlap, moved
 from caldrive.world.roads.network import Lane, RoadNetwork
 from caldrive.world.town import load_town
-from caldrive.world.traffic.parked_cars import APART, CLEAR_OF_EGO, WAY, ParkedCar, ParkedCars, Stage, _move
+from caldrive.world.traffic.parked_cars import (
+    APART,
+    BESIDE,
+    CLEAR_OF_EGO,
+    FARTHEST,
+    WAY,
+    ParkedCar,
+    ParkedCars,
+    Stage,
+    _may_begin,
+    _move,
+)
 from caldrive.world.traffic.sumo_process import MODELS
 from caldrive.world.truth.labels import hazard_stop, in_the_way, vehicle_distance
 
@@ -28,6 +39,14 @@ def ego_at(x: float, speed: float) -> VehicleState:
 
 def parked(willing: bool = True, length: float = 4.2, width: float = 1.76) -> ParkedCar:
     return ParkedCar("parked0", length, width, LANE, s=60.0, willing=willing)
+
+
+def test_nobody_begins_where_nobody_is_looked_at() -> None:
+    """Farther than that along an axis a car may be left alone: nothing could begin."""
+    farthest = max(
+        ahead for ahead in np.arange(0, 60, 0.1) for speed in np.arange(0, 20, 0.25) if _may_begin(ahead, speed)
+    )
+    assert math.hypot(farthest + ego_at(0, 0).length / 2, 2 * BESIDE) < FARTHEST
 
 
 def overlap(first: VehicleState, second: VehicleState) -> bool:

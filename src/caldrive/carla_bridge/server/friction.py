@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import msgspec
+
 from caldrive.carla_bridge.axes import Placement
 from caldrive.carla_bridge.server.actors import Actor
 from caldrive.carla_bridge.server.layouts import ActorDescription, PhysicsControl, Wheel
@@ -24,7 +26,7 @@ BEST = 2.0  # times the usual grip, which more friction does not raise: nor does
 
 @dataclass(eq=False)
 class FrictionVolume(Actor):
-    """A box in which all tyres have the same friction."""
+    """A box in which the tyres of all vehicles of clients have the same friction; of two boxes the first one counts."""
 
     friction: float = USUAL_FRICTION
     half: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -55,6 +57,19 @@ def require_friction(physics: PhysicsControl) -> None:
     for name, value in (*(("tire_friction", one.tire_friction) for one in physics.wheels), ("drag", physics.drag)):
         if not 0.0 <= value <= MOST_FRICTION:
             raise Refusal(f"found {name} {value}, wanted a number from 0 to {MOST_FRICTION:.0f}: give another one")
+
+
+def own_wheels(new: PhysicsControl, old: PhysicsControl, here: float | None) -> tuple[Wheel, ...]:
+    """The wheels that a client sets. Where it gives back what it read in a volume, with that volume's friction, a wheel
+    keeps its own."""
+    kept = [wheel.tire_friction for wheel in old.wheels]
+    kept += [USUAL_FRICTION] * (len(new.wheels) - len(kept))
+    return tuple(
+        msgspec.structs.replace(wheel, tire_friction=own)
+        if here is not None and math.isclose(wheel.tire_friction, here, rel_tol=1e-6)  # the wire has 32 bits
+        else wheel
+        for wheel, own in zip(new.wheels, kept, strict=False)
+    )
 
 
 def gripping(config: VehicleConfig, physics: PhysicsControl, here: float | None) -> VehicleConfig:

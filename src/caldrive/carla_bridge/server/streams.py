@@ -110,6 +110,7 @@ class Streams:
     def close_stream(self, stream: int) -> None:
         """Ends a stream."""
         self._open.discard(stream)
+        self._announced.pop(stream, None)  # nobody will come for it any more
         for subscriber in self._by_stream.pop(stream, []):
             self._drop(subscriber)
 

@@ -9,7 +9,7 @@ import msgspec
 
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server.actors import STILL, Actor
-from caldrive.carla_bridge.server.friction import gripping, require_friction
+from caldrive.carla_bridge.server.friction import gripping, own_wheels, require_friction
 from caldrive.carla_bridge.server.layouts import (
     AckermannControl,
     AckermannSettings,
@@ -18,6 +18,7 @@ from caldrive.carla_bridge.server.layouts import (
     VehicleControl,
     Wheel,
 )
+from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.datatypes import Control, VehicleState
 from caldrive.geometry import wrap_angle
 from caldrive.world.traffic.ego import EgoState, VehicleConfig, advance
@@ -185,8 +186,10 @@ def set_physics(vehicle: Vehicle, physics: PhysicsControl) -> None:
     """Takes over what the bicycle model has: the mass, the grip and the drag, and how far the front wheels turn.
     Raises Refusal where one of them cannot be."""
     require_friction(physics)
+    if not physics.mass >= 1.0:
+        raise Refusal(f"found a mass of {physics.mass} kg, wanted 1 kg at least: give another one")
     angles = [wheel.max_steer_angle for wheel in physics.wheels[:2]]
     if angles and 1.0 <= max(angles) <= 80.0:
         vehicle.config = replace(vehicle.config, max_steer=math.radians(max(angles)))
-    if physics.mass >= 1.0:
-        vehicle.physics = physics
+    wheels = own_wheels(physics, vehicle.physics, vehicle.friction_here)
+    vehicle.physics = msgspec.structs.replace(physics, wheels=wheels)
