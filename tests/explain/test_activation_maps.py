@@ -126,7 +126,7 @@ def test_a_map_of_hirescam_sums_to_the_change_along_its_activations(network: Net
     expected = float(attend(network, question, images).now.sum()) * question.spec.scale
     values = []
     for factor in (1 - share, 1 + share):
-        hook = layer[-1].register_forward_hook(lambda module, given, output, factor=factor: output * factor)
+        hook = layer[-1].register_forward_pre_hook(lambda module, given, factor=factor: (given[0] * factor,))
         values.append(ask(network, question, images).value)
         hook.remove()
     assert expected == pytest.approx((values[1] - values[0]) / (2 * share), rel=0.05, abs=1e-5)

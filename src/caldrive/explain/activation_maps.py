@@ -1,9 +1,10 @@
 """Where the network looks: class activation maps from gradients (section 4.4 of the paper), by one of two methods.
 
-`gradcam` is the paper's (Selvaraju et al. 2017): the maps of the last convolution, each weighted by the mean of its
+`gradcam` (Selvaraju et al. 2017), as in the paper: the maps of the last stage, each weighted by the mean of its
 gradient. `hirescam` (Draelos and Carin 2020) multiplies each place by its own gradient, so that a map shows what
-counted at that place; here it takes the stage before, whose places are half as large. docs/looking-inside.md measures
-both.
+counted at that place; here it takes the stage before, whose places are half as large. Both take the rectified maps that
+the last convolution of the stage is given: behind it, values are shifted by a batch norm, and 0 means nothing.
+docs/looking-inside.md measures both.
 
 Captum computes the gradients. All frames of a block's history pass the backbone as one batch: called frame by frame,
 Captum would keep the last one's map only and say nothing. The weights are those before they became 8-bit integers,
@@ -29,8 +30,8 @@ from caldrive.perception.network.network import COMMANDS, Network
 from caldrive.perception.targets import decode
 
 Map = NDArray[np.float32]
-# The stage of the backbone, from 0, whose last convolution is looked at: of the last one a place stands for 16 x 16
-# pixels, of the one before for 8 x 8.
+# The stage of the backbone, from 0, whose maps are looked at: in the last one a place stands for 16 x 16 pixels, in the
+# one before for 8 x 8.
 METHODS = {"hirescam": 3, "gradcam": 4}
 
 
@@ -118,9 +119,9 @@ def attend(network: Network, question: Question, images: Sequence[Image], method
         reply = _reply(question, _outputs(network, question, batch))
     asked, layer = partial(_evidence, network, question, reply.target), _last_convolution(network, METHODS[method])
     if method == "gradcam":
-        maps = captum.LayerGradCam(asked, layer).attribute(batch)[:, 0]
+        maps = captum.LayerGradCam(asked, layer).attribute(batch, attribute_to_layer_input=True)[:, 0]
     else:
-        maps = captum.LayerGradientXActivation(asked, layer).attribute(batch).sum(1)
+        maps = captum.LayerGradientXActivation(asked, layer).attribute(batch, attribute_to_layer_input=True).sum(1)
     arrays = (maps.relu() if question.spec.discrete else maps).detach().numpy().astype(np.float32)
     return Attention(reply, tuple(arrays), frames_back(network, question.affordance))
 
@@ -182,7 +183,7 @@ def _evidence(network: Network, question: Question, target: int, images: Tensor)
 
 
 def _last_convolution(network: Network, stage: int) -> nn.Module:
-    """The last convolution of a stage of the backbone: its map is not halved yet."""
+    """The last convolution of a stage of the backbone: what it is given is not halved yet."""
     convolutions = network.backbone.stages[stage]
     assert isinstance(convolutions, nn.ModuleList)
     return convolutions[-1]
