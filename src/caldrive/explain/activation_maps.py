@@ -1,4 +1,4 @@
-"""Where the network looks: class activation maps from gradients (section 4.4 of the paper), by one of two methods.
+"""Where the network looks: class activation maps from gradients (section 4.3 of the paper), by one of two methods.
 
 `gradcam` (Selvaraju et al. 2017), as in the paper: the maps of the last stage, each weighted by the mean of its
 gradient. `hirescam` (Draelos and Carin 2020) multiplies each place by its own gradient, so that a map shows what

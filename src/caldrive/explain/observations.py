@@ -1,4 +1,4 @@
-"""The paper's three observations on attention (section 4, Fig. 4) as statements, each tested on cases of a drive.
+"""The paper's three observations on attention (section 4.3, Fig. 4) as statements, each tested on cases of a drive.
 
 The network looks at the road's outlines for traffic lights; it sees a hazard announced by the shadow of a person who is
 not in the picture; it looks at the legs of a person. Where it looks is one question, whether its answer hangs on that
