@@ -113,6 +113,20 @@ def test_nobody_steps_before_a_car_that_cannot_stop_any_more_and_who_is_there_go
     assert not bumps(there, (0.0, 0.14), cars)
 
 
+@pytest.mark.parametrize("curvature", [0.0, 0.14, -0.2])
+def test_nobody_walks_into_a_standing_ego_whatever_its_wheels_point_at(curvature: float) -> None:
+    """Its path bends, its body does not."""
+    rng, body = np.random.default_rng(0), shapely.Polygon(box_corners(Pose(0, 0, 0), 4.2, 1.8))
+    cars = Cars(boxes_of([car(0.0)]), curvature, curvature)
+    for x, y, way in rng.uniform((-6, -5, 0), (8, 5, math.tau), (1200, 3)).tolist():
+        place, step = np.array((x, y)), (0.13 * math.cos(way), 0.13 * math.sin(way))
+        near = body.distance(shapely.Point(place))
+        for _ in range(60 if 0.5 < near < 4 else 0):
+            if may_walk(place, step, 1.3, cars, False) and not bumps(place, step, cars):
+                place = place + step
+        assert near <= 0.5 or body.distance(shapely.Point(place)) > 0.3
+
+
 @pytest.mark.parametrize("speed", [0.0, 4.0])
 @pytest.mark.parametrize("left", [-1.2, -0.3])
 def test_whoever_is_before_a_car_may_leave(speed: float, left: float) -> None:

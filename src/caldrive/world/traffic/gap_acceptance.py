@@ -84,7 +84,10 @@ def bumps(position: Points, step: tuple[float, float], cars: Cars) -> bool:
     corridor, and beside them."""
     for look in range(_looks(cars)):
         car, curvature = _looked_at(cars, look)
-        if _is_bumped(position, step, cars.boxes[car], curvature):
+        box = cars.boxes[car]
+        if _is_bumped(position, step, box, curvature, _reach(position, box, curvature)):
+            return True
+        if curvature != 0 and _is_bumped(position, step, box, 0.0, TOUCH):  # its body does not bend with its path
             return True
     return False
 
@@ -145,16 +148,22 @@ def _is_too_near(
 
 
 @inlined
-def _is_bumped(position: Points, step: tuple[float, float], box: Floats, curvature: float) -> bool:
-    """Whether a step leads into a car on such a path, or in front of it where it cannot stop any more."""
-    speed, half = box[3], box[4]
+def _reach(position: Points, box: Floats, curvature: float) -> float:
+    """m ahead of a car on such a path within which it cannot stop any more, or does not see somebody in time."""
+    speed = box[3]
+    if speed > MOVING and _is_unseen(position, box, curvature):
+        return float(speed * CROSSES + MAY_GAIN * CROSSES * CROSSES / 2)
+    if speed > MOVING:
+        return float(max(TOUCH, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER))
+    return TOUCH
+
+
+@inlined
+def _is_bumped(position: Points, step: tuple[float, float], box: Floats, curvature: float, reach: float) -> bool:
+    """Whether a step leads into a car on such a path, or in front of it within its reach (m)."""
+    half = box[4]
     ahead, left = _before(box, position[0], position[1], curvature)
     then_ahead, then_left = _before(box, position[0] + step[0], position[1] + step[1], curvature)
-    reach = TOUCH
-    if speed > MOVING and _is_unseen(position, box, curvature):
-        reach = speed * CROSSES + MAY_GAIN * CROSSES * CROSSES / 2
-    elif speed > MOVING:
-        reach = max(reach, speed * REACTION / 2 + speed * speed / (2 * FULL_BRAKE) + LEFT_OVER)
     body = _body(left, half, curvature)
     is_near = -2 * half - TOUCH < ahead < reach and abs(left) < body
     will_be = -2 * half - TOUCH < then_ahead < reach and abs(then_left) < _body(then_left, half, curvature)
