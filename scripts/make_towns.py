@@ -29,7 +29,7 @@ from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.town import load_town
 
-PLAN, COLUMNS, QUALITY = 210, 4, 85  # pixels of a plan's width; towns in a row; of the JPEG
+PLAN, COLUMNS, QUALITY = 210, 4, 60  # pixels of a plan's width; towns in a row; of the JPEG
 WEATHERS = (1, 3, 6, 8)
 VIEW = (290, 210)  # pixels of a camera's image
 
