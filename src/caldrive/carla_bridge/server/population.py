@@ -46,13 +46,13 @@ class Population:
         while self._time < time - SAME_TIME:
             self._time = round(self._time + DT, 6)
             before = self._cars, self._walkers
-            everyone = [*guests, *self._cars]
-            self.lights.step(self._time, boxes_of(everyone))
+            boxes = boxes_of((*guests, *self._cars))
+            self.lights.step(self._time, boxes)
             if self._traffic is not None:
                 self._traffic.guests.update(guests)
                 self._traffic.step(self._time, None, [*self._walkers, *walkers])
                 self._cars = self._traffic.cars
-            self._people.step(DT, boxes_of(everyone))
+            self._people.step(DT, boxes)
             self._walkers = self._people.states()
             self._before = before
 
