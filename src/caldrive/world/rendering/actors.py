@@ -59,23 +59,23 @@ def seen_actors(
 ) -> Actors:  # fmt: skip
     """Those in view. zoom: how many times as far as in a small picture they are seen. shown: what is drawn of people,
     by id, where that is not the whole."""
-    kinds, rows = list[tuple[int, int, bool, bool]](), list[Row]()
+    kinds, bodies, shadows = list[tuple[int, int]](), list[Row](), list[Row]()
     for vehicle, away in _in_view(frustum, vehicles, CAR_FAR * zoom):
         look = _car_look(vehicle.id)
-        kinds.append((2 * look[0] + (away > CAR_DETAIL * zoom), int(Semantic.VEHICLE), True, True))
-        rows.append(_car_row(vehicle, *look))
+        kinds.append((2 * look[0] + (away > CAR_DETAIL * zoom), int(Semantic.VEHICLE)))
+        bodies.append(_car_row(vehicle, look[1]))
+        shadows.append(_car_shadow(vehicle, look[0]))
     for person, away in _in_view(frustum, pedestrians, PERSON_FAR * zoom):
-        part = shown.get(person.id, Shown.WHOLE)
-        body = BODIES.get(part & ~Shown.SHADOW)
-        mesh = (body or PEOPLE) + (away > PERSON_DETAIL * zoom)
-        kinds.append((mesh, int(Semantic.PERSON), body is not None, Shown.SHADOW in part))
-        rows.append(_person_row(person, *_person_look(person.id)))
-    meshes, classes, bodies, shadows = np.array(kinds, np.int32).reshape(-1, 4).T.copy()
-    table = np.array(rows, np.float32).reshape(-1, 10 + COLORS + 8)
-    has_body, has_shadow = bodies > 0, shadows > 0
-    *looks, _ = np.split(table[has_body], (7, 10, 10 + COLORS), axis=1)
-    parts = (*looks, table[has_shadow, 10 + COLORS :])
-    return Actors(meshes[has_body], classes[has_body], *(np.ascontiguousarray(part) for part in parts))
+        part, figure = shown.get(person.id, Shown.WHOLE), _person_look(person.id)
+        if body := BODIES.get(part & ~Shown.SHADOW):
+            kinds.append((body + (away > PERSON_DETAIL * zoom), int(Semantic.PERSON)))
+            bodies.append(_person_row(person, *figure))
+        if Shown.SHADOW in part:
+            shadows.append(_person_shadow(person, figure[0]))
+    meshes, classes = np.array(kinds, np.int32).reshape(-1, 2).T.copy()
+    table = np.array(bodies, np.float32).reshape(-1, 10 + COLORS)
+    places, scales, colors = (table[:, part].copy() for part in (slice(7), slice(7, 10), slice(10, None)))
+    return Actors(meshes, classes, places, scales, colors, np.array(shadows, np.float32).reshape(-1, 8))
 
 
 def _in_view(frustum: Frustum, actors: Iterable[Actor], far: float) -> Iterator[tuple[Actor, float]]:
@@ -96,6 +96,7 @@ def _seed(id: str) -> int:
     return zlib.crc32(id.encode()) >> 3
 
 
+@lru_cache(maxsize=4096)
 def _bright(*colors: RGB) -> Row:
     return tuple(value / 255 for color in colors for value in color)
 
@@ -115,26 +116,35 @@ def _person_look(id: str) -> tuple[float, Row]:
     return float(people.heights(np.array(seed))) / people.HEIGHT, colors
 
 
-def _car_row(car: VehicleState, shape: int, paint: Row) -> Row:
-    x, y, heading = car.pose.x, car.pose.y, car.pose.heading
-    along, across = car.length / cars.LENGTH, car.width / cars.WIDTH
+def _car_row(car: VehicleState, paint: Row) -> Row:
+    """A row each of Actors.places, scales and colors."""
     tail = cars.BRAKE_LAMP if car.speed < STANDS else cars.TAIL_LAMP
-    half_length, half_width = along * (cars.LENGTH / 2 - 0.15), across * (cars.WIDTH / 2 - 0.05)
     return (
-        x, y, math.cos(heading), math.sin(heading), 1.0, 0.0, 0.0, along, across, 1.0,
+        car.pose.x, car.pose.y, math.cos(car.pose.heading), math.sin(car.pose.heading), 1.0, 0.0, 0.0,
+        car.length / cars.LENGTH, car.width / cars.WIDTH, 1.0,
         *paint, *_bright(tail, cars.HEAD_LAMP, BLACK),
-        x, y, heading, 0.85 * SHAPES[shape].height, half_length, half_width, 0.75, 0.02,
     )  # fmt: skip
+
+
+def _car_shadow(car: VehicleState, shape: int) -> Row:
+    half_length = car.length / cars.LENGTH * (cars.LENGTH / 2 - 0.15)
+    half_width = car.width / cars.WIDTH * (cars.WIDTH / 2 - 0.05)
+    height = 0.85 * SHAPES[shape].height
+    return car.pose.x, car.pose.y, car.pose.heading, height, half_length, half_width, 0.75, 0.02
 
 
 def _person_row(person: PedestrianState, height: float, colors: Row) -> Row:
-    """A person's steps follow from the way covered, so that no foot slides."""
+    """Likewise. A person's steps follow from the way covered, so that no foot slides."""
     x, y, heading = person.pose.x, person.pose.y, person.pose.heading
     cosine, sine = math.cos(heading), math.sin(heading)
     swing = SWING * min(person.speed, FASTEST_SWING) * math.sin(math.pi / STRIDE * (x * cosine + y * sine))
-    lift = 0.0 if person.on_road else KERB_HEIGHT
-    return (
-        x, y, cosine, sine, math.cos(swing), math.sin(swing), lift, height, height, height,
-        *colors,
-        x, y, heading, 1.7 * height, 0.12, 0.22, 0.45, 0.02 + lift,
-    )  # fmt: skip
+    return x, y, cosine, sine, math.cos(swing), math.sin(swing), _lift(person), height, height, height, *colors
+
+
+def _person_shadow(person: PedestrianState, height: float) -> Row:
+    return person.pose.x, person.pose.y, person.pose.heading, 1.7 * height, 0.12, 0.22, 0.45, 0.02 + _lift(person)
+
+
+def _lift(person: PedestrianState) -> float:
+    """m above the road."""
+    return 0.0 if person.on_road else KERB_HEIGHT

@@ -177,25 +177,44 @@ def draw_rain(picture: Floats, drops: Floats, focal: np.float32, time: np.float3
     height, width, size = picture.shape[0], picture.shape[1], drops.shape[0]
     seed = time * f32(7.3) % ONE
     strength = f32(0.35) + f32(0.65) * light.rain
+    red, green, blue = _streak_color(light.horizon[0]), _streak_color(light.horizon[1]), _streak_color(light.horizon[2])
     for row in range(height):
         y = (HALF * f32(height) - HALF - f32(row)) / focal
+        near_row, near_up = _texel(y * f32(0.5) + f32(2.7) * time + f32(3.0) * seed, size)
+        far_row, far_up = _texel(y * f32(0.9) + f32(1.9) * time + seed, size)
         for column in range(width):
             x = (f32(column) + HALF - HALF * f32(width)) / focal
-            near = _drop(drops, x * f32(0.9) + seed, y * f32(0.5) + f32(2.7) * time + f32(3.0) * seed, size)
-            far = _drop(drops, x * f32(1.9) + f32(0.31) + TWO * seed, y * f32(0.9) + f32(1.9) * time + seed, size)
+            near = _drop(drops, x * f32(0.9) + seed, near_row, near_up)
+            far = _drop(drops, x * f32(1.9) + f32(0.31) + TWO * seed, far_row, far_up)
             streak = (near * f32(0.30) + far * f32(0.22)) * strength
-            for c in range(3):
-                color = light.horizon[c] + f32(0.4) * (f32(0.9) - light.horizon[c])
-                picture[row, column, c] += streak * (color - picture[row, column, c])
+            pixel = picture[row, column]
+            pixel[0] += streak * (red - pixel[0])
+            pixel[1] += streak * (green - pixel[1])
+            pixel[2] += streak * (blue - pixel[2])
 
 
 @inlined
-def _drop(drops: Floats, u: np.float32, v: np.float32, size: int) -> np.float32:
-    u, v = (u - np.floor(u) + ONE) * f32(size) - HALF, (v - np.floor(v) + ONE) * f32(size) - HALF
-    column, row = i32(u), i32(v)
-    right, up = u - f32(column), v - f32(row)
-    a, b = drops[row % size, column % size], drops[row % size, (column + 1) % size]
-    c, d = drops[(row + 1) % size, column % size], drops[(row + 1) % size, (column + 1) % size]
+def _streak_color(horizon: np.float32) -> np.float32:
+    """Of a channel: rain is as bright as the sky behind it, and whiter."""
+    color: np.float32 = horizon + f32(0.4) * (f32(0.9) - horizon)
+    return color
+
+
+@inlined
+def _texel(u: np.float32, size: int) -> tuple[int, np.float32]:
+    """The texel before a place u, of so many (a power of two) in each whole, and the share of the way to the next."""
+    u = (u - np.floor(u) + ONE) * f32(size) - HALF
+    whole = i32(u)
+    return int(whole) & (size - 1), u - f32(whole)
+
+
+@inlined
+def _drop(drops: Floats, u: np.float32, row: int, up: np.float32) -> np.float32:
+    """How much of a streak is at a place u along a row of drops, by a share up of the way to the next row."""
+    mask = drops.shape[0] - 1
+    column, right = _texel(u, mask + 1)
+    a, b = drops[row, column], drops[row, (column + 1) & mask]
+    c, d = drops[(row + 1) & mask, column], drops[(row + 1) & mask, (column + 1) & mask]
     low, high = a + right * (b - a), c + right * (d - c)
     between: np.float32 = low + up * (high - low)
     return between

@@ -105,7 +105,7 @@ class ParkedCars:
         near: Callable[[Pose, float], list[Obstacle]],
         models: Sequence[tuple[str, float, float]],
     ) -> None:
-        self.cars: list[ParkedCar] = []
+        self.cars, self._awake = list[ParkedCar](), list[ParkedCar]()  # all, and those that move or stand out
         places = _places(roads) if n else []
         for k in rng.permutation(len(places)).tolist():
             lane, s = places[k]
@@ -137,14 +137,17 @@ class ParkedCars:
     def step(self, dt: float, ego: VehicleState, others: Sequence[VehicleState]) -> list[ParkedCar]:
         """Moves them on by dt seconds; returns those that have left and drive in their lane from now on. others: all
         that drive."""
-        away = np.abs(self._places - (ego.pose.x, ego.pose.y)).max(axis=1, initial=0.0).tolist()
-        for car, distance in zip(self.cars, away, strict=True):
-            if distance <= FARTHEST or car.stage is not Stage.PARKED:
-                _move(car, dt, ego, others)
-        gone = [car for car in self.cars if car.way >= WAY]
-        if any(car.stage is not Stage.PARKED for car in self.cars):
-            self.cars = [car for car in self.cars if car.way < WAY]
-            self._look()
+        is_near = np.abs(self._places - (ego.pose.x, ego.pose.y)).max(axis=1, initial=0.0) <= FARTHEST
+        moved_on = self._awake + [self.cars[k] for k in np.flatnonzero(is_near) if self.cars[k].stage is Stage.PARKED]
+        for car in moved_on:
+            _move(car, dt, ego, others)
+        self._awake = [car for car in moved_on if car.stage is not Stage.PARKED]
+        if not self._awake:
+            return []
+        gone = [car for car in self._awake if car.way >= WAY]
+        self._awake = [car for car in self._awake if car.way < WAY]
+        self.cars = [car for car in self.cars if car.way < WAY]
+        self._look()
         return gone
 
 
