@@ -20,7 +20,8 @@ from pathlib import Path
 from caldrive.files import write_whole
 from caldrive.provenance import code_version
 
-OUT, KEPT = Path("out/results"), Path(__file__).parents[1] / "docs" / "results"
+ROOT = Path(__file__).parents[1]
+OUT, KEPT = Path("out/results"), ROOT / "docs" / "results"
 ORACLE = ["--agent", "oracle"]
 AGENTS = {"oracle": ORACLE, "cal": ["--agent", "cal"]}
 FAST = "scripts/begins_at_60.toml"  # who sees no sign drives as fast as before the first one
@@ -81,7 +82,8 @@ def keep(suite: str, drivers: list[str]) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     kept = KEPT / suite
     kept.mkdir(parents=True, exist_ok=True)
-    write_whole(kept / "report.md", (OUT / suite / "report.md").read_bytes())
+    report = (OUT / suite / "report.md").read_text()
+    write_whole(kept / "report.md", report.replace(f"{ROOT}/", "").encode())  # as it is typed
     for driver in drivers:
         (kept / driver).mkdir(exist_ok=True)
         write_whole(kept / driver / "run.json", (OUT / suite / driver / "run.json").read_bytes())

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from caldrive.control.controller import CALController
+from caldrive.control.controller import SIGN_LEAVES, CALController
 from caldrive.control.longitudinal import DriveState
 from caldrive.control.presets import DEFAULT, PAPER
 from caldrive.datatypes import Affordances, Command
@@ -33,18 +33,32 @@ def test_every_control_is_lawful(config: object, frames: list[tuple[Affordances,
         assert -1 <= control.steer <= 1
 
 
-def test_remembers_the_last_sign() -> None:
+def limit_after(controller: CALController, sign: int | None, metres: float = 0.0) -> float | None:
+    """The limit when a sign is seen, or none is, and the car has driven on so far at 5 m/s."""
+    decision = controller.step(Affordances(speed_sign=sign), 5.0, Command.STRAIGHT)
+    for _ in range(round(metres / (5.0 * controller.dt))):
+        decision = controller.step(Affordances(), 5.0, Command.STRAIGHT)
+    return decision.speed_limit
+
+
+def test_a_higher_limit_counts_from_the_sign_on_which_leaves_the_view_before() -> None:
     controller = CALController(DEFAULT)
-    assert controller.step(Affordances(), 5.0, Command.STRAIGHT).speed_limit == 30
-    assert controller.step(Affordances(speed_sign=60), 5.0, Command.STRAIGHT).speed_limit == 60
-    assert controller.step(Affordances(), 5.0, Command.STRAIGHT).speed_limit == 60
-    assert controller.step(Affordances(speed_sign=30), 5.0, Command.STRAIGHT).speed_limit == 30
+    assert limit_after(controller, 60) == 30
+    assert limit_after(controller, None, metres=SIGN_LEAVES - 1.5) == 30
+    assert limit_after(controller, None, metres=3.0) == 60
+
+
+def test_a_lower_limit_counts_from_when_its_sign_is_seen_on() -> None:
+    controller = CALController(DEFAULT)
+    assert limit_after(controller, 90, metres=10.0) == 90
+    assert limit_after(controller, 60) == 60
+    assert limit_after(controller, None, metres=50.0) == 60
 
 
 def test_cap_bounds_every_limit_and_leaves_lower_ones() -> None:
     controller = CALController(replace(DEFAULT, cap=40.0))
-    assert controller.step(Affordances(speed_sign=90), 5.0, Command.STRAIGHT).speed_limit == 40
-    assert controller.step(Affordances(speed_sign=30), 5.0, Command.STRAIGHT).speed_limit == 30
+    assert limit_after(controller, 90, metres=10.0) == 40
+    assert limit_after(controller, 30) == 30
 
 
 def test_reset_starts_a_fresh_episode() -> None:

@@ -11,6 +11,8 @@ from caldrive.control.patience import CAR_AS_HAZARD, PatienceConfig, Waiting, ne
 from caldrive.control.pid import clip
 from caldrive.datatypes import DT, KMH, Affordances, Command, Control, Decision
 
+SIGN_LEAVES = 7.4  # m ahead of the front axle where a sign leaves the view: there the area A1 of Fig. 4 begins
+
 
 @dataclass(frozen=True)
 class ControlConfig:
@@ -42,7 +44,8 @@ class CALController:
         """Forget the last episode: PID, steering, the speed limit and how long the car has waited."""
         self._memory, self._waiting = Memory(), Waiting()
         self._angle = 0.0
-        self._limit = self.config.initial_limit
+        self._limit = self._sign = self.config.initial_limit  # in force, and the last sign's
+        self._before_sign = 0.0  # m
 
     @property
     def speed_limit(self) -> float:
@@ -54,8 +57,7 @@ class CALController:
         wrong = [value for value in astuple(affordances) if value is not None and not math.isfinite(value)]
         if wrong or not math.isfinite(speed):
             return self._blind(affordances)
-        if affordances.speed_sign is not None:
-            self._limit = float(affordances.speed_sign)
+        self._read(affordances.speed_sign, speed)
 
         patient, note = self._wait(affordances, speed / KMH)
         ceiling = math.inf if patient is affordances else self.config.patience.creep_speed
@@ -67,6 +69,16 @@ class CALController:
         stopped = along.state in (DriveState.HAZARD_STOP, DriveState.RED_LIGHT)
         state = DriveState.CREEPING if note and not stopped else along.state
         return Decision(control, affordances, state, self.speed_limit, along.target_speed, note)
+
+    def _read(self, sign: float | None, speed: float) -> None:
+        """A lower limit counts from when its sign is seen on, a higher one from the sign on; speed in m/s."""
+        if sign is not None:
+            self._sign, self._before_sign = float(sign), SIGN_LEAVES
+            self._limit = min(self._limit, self._sign)
+        else:
+            self._before_sign -= speed * self.dt
+            if self._before_sign <= 0:
+                self._limit = self._sign
 
     def _wait(self, affordances: Affordances, speed: float) -> tuple[Affordances, str]:
         """The affordances without what the car has waited for long enough, and a note on it; speed in km/h."""

@@ -54,16 +54,21 @@ def overlap(first: VehicleState, second: VehicleState) -> bool:
     return boxes_overlap(*boxes)
 
 
-def meet(speed: float, looks: bool, car: ParkedCar) -> bool:
-    """Whether an ego at a speed (m/s), which brakes for a hazard if it looks, touches the car."""
-    ego = ego_at(20.0, speed)
+def meet(
+    speed: float, looks: bool, car: ParkedCar, acceleration: float = 0.0, x: float = 20.0, most: float = 0.0
+) -> bool:
+    """Whether an ego at x m and a speed (m/s), which speeds up (m/s²) to another one (m/s) and brakes for a hazard if
+    it looks, touches the car."""
+    ego, gain = ego_at(x, speed), acceleration
     for _ in range(300):
-        _move(car, DT, ego, [])
+        _move(car, DT, ego, gain, [])
         state = car.state
         hazards = [state] if in_the_way(state, LANE.line, ego.pose.x) else []
         sees = hazard_stop(moved(ego.pose, forward=AXLE), hazards, ())
-        slower = max(0.0, ego.speed - 7.5 * DT) if looks and sees else ego.speed
-        ego = ego_at(ego.pose.x + (ego.speed + slower) / 2 * DT, slower)
+        faster = max(ego.speed, min(ego.speed + acceleration * DT, most))
+        then = max(0.0, ego.speed - 7.5 * DT) if looks and sees else faster
+        gain = (then - ego.speed) / DT
+        ego = ego_at(ego.pose.x + (ego.speed + then) / 2 * DT, then)
         if overlap(ego, state):
             return True
     return False
@@ -80,12 +85,24 @@ def test_who_looks_stops_before_a_car_that_pulls_out_and_who_does_not_runs_into_
         assert meet(kmh * KMH, False, replace(car, s=60.0 + offset))
 
 
+@pytest.mark.parametrize("most", [20, 30])
+@pytest.mark.parametrize("acceleration", [1.0, 2.0, 3.0])
+def test_who_speeds_up_behind_a_turn_and_looks_is_not_touched_either(acceleration: float, most: float) -> None:
+    began = 0
+    for speed in np.arange(2.5, most * KMH, 0.5):
+        for x in np.arange(30.0, 56.0, 0.5):
+            car = parked(length=4.8, width=1.9)
+            assert not meet(float(speed), True, car, acceleration, float(x), most * KMH), (speed, x)
+            began += car.stage is not Stage.PARKED
+    assert began > 0
+
+
 def test_who_looks_at_the_car_ahead_only_does_not_see_it() -> None:
     car = parked()
     ego = ego_at(40.0, 20 * KMH)
     while car.stage is not Stage.WAITING:
         ego = ego_at(ego.pose.x + ego.speed * DT, ego.speed)
-        _move(car, DT, ego, [])
+        _move(car, DT, ego, 0.0, [])
     assert vehicle_distance(ego, moved(ego.pose, forward=AXLE), [car.state]) == 50.0
 
 
@@ -93,7 +110,7 @@ def test_it_drives_off_when_the_ego_stands() -> None:
     car = parked()
     ego, standing = ego_at(30.0, 20 * KMH), 0
     for _ in range(200):
-        _move(car, DT, ego, [])
+        _move(car, DT, ego, 0.0, [])
         if car.stage is Stage.PARKED or (car.stage is Stage.PULLING_OUT and ego.speed):
             ego = ego_at(ego.pose.x + ego.speed * DT, ego.speed)
         if car.stage is Stage.WAITING:
@@ -111,14 +128,14 @@ def test_nobody_pulls_out_before_who_stands_who_is_too_fast_or_who_drives_elsewh
 ) -> None:
     car = parked()
     for k in range(100):
-        _move(car, DT, replace(ego_at(0, speed), pose=Pose(x + k * speed * DT, left, 0.0)), [])
+        _move(car, DT, replace(ego_at(0, speed), pose=Pose(x + k * speed * DT, left, 0.0)), 0.0, [])
     assert car.stage is Stage.PARKED
 
 
 def test_nobody_pulls_out_in_front_of_others() -> None:
     car, other = parked(), replace(ego_at(52.0, 5.0), id="car1")
     for k in range(60):
-        _move(car, DT, ego_at(40.0 + k * 0.5, 5.5), [other])
+        _move(car, DT, ego_at(40.0 + k * 0.5, 5.5), 0.0, [other])
     assert car.stage is Stage.PARKED
 
 

@@ -2,7 +2,8 @@
 
 They begin so late that the ego sees them when it can just stop, wait with their nose in the lane until it stands, and
 then drive off as one of the traffic's. Who does not look for hazards runs into them: their centre is not in the lane
-yet, so that they are nobody whom one could follow.
+yet, so that they are nobody whom one could follow. Where the ego could not stop after all, as it speeds up, they stay
+beside its path; from a point on they do not go back any more, as half out they would be hit before they are seen.
 """
 
 from __future__ import annotations
@@ -30,10 +31,11 @@ WILLING = 0.7  # share of those that pull out when the ego comes
 WAY = 8.0  # m that pulling out takes along the lane
 LINE = 1.8  # m of them after which the car is in the hazard area A2
 NOSE_OUT = 2.7  # m of them after which it waits for the ego to stop
+CLEAR = 0.55  # m of them up to which an ego in the middle of its lane passes by
 ACCELERATION, BRAKE = 2.0, 5.0  # m/s²
 TO_LINE = math.sqrt(2 * LINE / ACCELERATION)  # s
 SEEN = 7.2  # m from the ego's bumper to the car's middle within which it is in A2
-SLOWEST, FASTEST = 2.5, 7.5  # m/s of an ego before which somebody pulls out
+SLOWEST, FASTEST = 2.5, 7.0  # m/s of an ego before which somebody pulls out: who is faster cannot stop within SEEN
 STANDS, AFTER = 0.3, 1.5  # m/s below which the ego stands, and s for which it has to before the car goes on
 FARTHEST = 30.0  # m from the ego along an axis beyond which nobody who is parked begins
 OTHERS = 14.0  # m around it within which no other car may drive
@@ -106,6 +108,7 @@ class ParkedCars:
         models: Sequence[tuple[str, float, float]],
     ) -> None:
         self.cars, self._awake = list[ParkedCar](), list[ParkedCar]()  # all, and those that move or stand out
+        self._speed = ego.speed  # the ego's, of the step before
         places = _places(roads) if n else []
         for k in rng.permutation(len(places)).tolist():
             lane, s = places[k]
@@ -139,8 +142,9 @@ class ParkedCars:
         that drive."""
         is_near = np.abs(self._places - (ego.pose.x, ego.pose.y)).max(axis=1, initial=0.0) <= FARTHEST
         moved_on = self._awake + [self.cars[k] for k in np.flatnonzero(is_near) if self.cars[k].stage is Stage.PARKED]
+        acceleration, self._speed = (ego.speed - self._speed) / dt, ego.speed
         for car in moved_on:
-            _move(car, dt, ego, others)
+            _move(car, dt, ego, acceleration, others)
         self._awake = [car for car in moved_on if car.stage is not Stage.PARKED]
         if not self._awake:
             return []
@@ -163,19 +167,21 @@ def _places(roads: RoadNetwork) -> list[tuple[Lane, float]]:
     return places
 
 
-def _move(car: ParkedCar, dt: float, ego: VehicleState, others: Sequence[VehicleState]) -> None:
-    """A car's next dt seconds."""
+def _move(
+    car: ParkedCar, dt: float, ego: VehicleState, acceleration: float, others: Sequence[VehicleState]
+) -> None:  # fmt: skip
+    """A car's next dt seconds. acceleration: of the ego, m/s²."""
     if car.stage is Stage.PARKED and not car.willing:
         return
     state = car.state
     ahead, left = to_local(moved(ego.pose, forward=ego.length / 2), np.array((state.pose.x, state.pose.y))).tolist()
     along = abs(wrap_angle(ego.pose.heading - car.lane.line.heading_at(car.s))) < 0.3
     if car.stage is Stage.PARKED:
-        if along and abs(left) < 2 * BESIDE and _may_begin(ahead, ego.speed) and _is_alone(state, others):
+        is_here = along and abs(left) < 2 * BESIDE
+        if is_here and _may_begin(*_then(ahead, ego.speed, acceleration, TO_LINE)) and _is_alone(state, others):
             car.stage = Stage.PULLING_OUT
     elif car.stage is Stage.PULLING_OUT:
-        late = car.way < LINE and ahead < room_to_stop(ego.speed) + 0.5 * car.length / 2
-        if late or car.way >= NOSE_OUT:
+        if car.way >= NOSE_OUT or (_can_stay(car, dt) and not _can_stop(car, ahead, ego.speed, acceleration)):
             car.stage = Stage.WAITING
     elif car.stage is Stage.WAITING:
         car.stood = car.stood + dt if ego.speed < STANDS else 0.0
@@ -195,12 +201,29 @@ def _drive(car: ParkedCar, dt: float) -> None:
     car.way += car.speed * dt
 
 
+def _then(ahead: float, speed: float, acceleration: float, after: float) -> tuple[float, float]:
+    """m to the car's middle, and speed, of an ego that goes on as it does for so many s."""
+    later = max(0.0, speed + acceleration * after)
+    return ahead - (speed + later) / 2 * after, later
+
+
 def _may_begin(ahead: float, speed: float) -> bool:
-    """Whether an ego so many m before the car's middle at a speed sees it in time, and no earlier than it must."""
+    """Whether an ego so many m before the car's middle at a speed, when the car is seen, can stop and has to."""
     if not SLOWEST < speed < FASTEST:
         return False
-    then = ahead - speed * TO_LINE
-    return room_to_stop(speed) + 1.0 <= then <= max(SEEN, room_to_stop(speed) + 2.0)
+    return room_to_stop(speed) + 1.0 <= ahead <= max(SEEN, room_to_stop(speed) + 2.0)
+
+
+def _can_stay(car: ParkedCar, dt: float) -> bool:
+    """Whether a car still stays beside the path of an ego if it begins to brake after dt seconds."""
+    return car.way + car.speed * dt + car.speed**2 / (2 * BRAKE) <= CLEAR
+
+
+def _can_stop(car: ParkedCar, ahead: float, speed: float, acceleration: float) -> bool:
+    """Whether an ego that goes on as it does can stop from when the car is seen."""
+    to_line = (math.sqrt(car.speed**2 + 2 * ACCELERATION * (LINE - car.way)) - car.speed) / ACCELERATION
+    then, later = _then(ahead, speed, acceleration, to_line)
+    return later < FASTEST and then >= room_to_stop(later)
 
 
 def _is_alone(car: VehicleState, others: Sequence[VehicleState]) -> bool:
