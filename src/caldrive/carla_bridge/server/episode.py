@@ -56,7 +56,9 @@ class Episode:
         lights, signs = light_actors(town.roads, numbers, ids.lights), sign_actors(town, numbers, ids.signs)
         self.lights = LightKeeper(lights, self._population.lights)
         self._actors: dict[int, Actor] = {one.id: one for one in (self.spectator, *lights, *signs)}
+        self._by_kind: dict[type[Actor], list[Actor]] = {}
         self._natives: dict[str, Actor] = {}
+        self._signs: dict[int, tuple[Placement, bytes]] = {}  # by number: where a sign stands, and its row in snapshots
         self._at_light: dict[int, Light | None] = {}
         shapely.prepare(town.roads.roadway)
         self._take_down()
@@ -75,11 +77,14 @@ class Episode:
 
     def all(self, kind: type[Kind]) -> list[Kind]:
         """The actors of a kind, in the order of their numbers."""
-        return [one for one in self._actors.values() if isinstance(one, kind)]
+        if kind not in self._by_kind:
+            self._by_kind[kind] = [one for one in self._actors.values() if isinstance(one, kind)]
+        return [one for one in self._by_kind[kind] if isinstance(one, kind)]
 
     def add(self, actor: Actor) -> None:
         """A client's actor is there from now on."""
         self._actors[actor.id], self.has_changed = actor, True
+        self._by_kind.clear()
         if actor.parent is not None:
             actor.parent.children.append(actor)
 
@@ -91,6 +96,7 @@ class Episode:
         if actor.parent is not None and actor in actor.parent.children:
             actor.parent.children.remove(actor)
         self._actors.pop(actor.id, None)
+        self._by_kind.clear()
         self.has_changed = True
         return gone
 
@@ -154,6 +160,7 @@ class Episode:
             about = description(kind, **usual_attributes(kind) | {"role_name": "autopilot"})
             actor = Actor(next(self._numbers), about, Placement(), box=box)
             self._natives[body.id] = self._actors[actor.id] = actor
+            self._by_kind.clear()
         actor = self._natives[body.id]
         c, s = math.cos(body.pose.heading), math.sin(body.pose.heading)
         actor.motion = (vector_to_carla(body.speed * c, body.speed * s), NOTHING, NOTHING)
@@ -195,11 +202,17 @@ class Episode:
         """All actors, as a snapshot has them."""
         absent = self._natives.keys() - {one.id for one in self.cars} - {one.id for one in self.people}
         missing = {self._natives[name].id for name in absent}
-        return [
-            snapshot.actor_row(one.id, one.place, one.motion, self._part(one))
-            for one in self._actors.values()
-            if one.id not in missing
-        ]
+        return [self._row(one) for one in self._actors.values() if one.id not in missing]
+
+    def _row(self, actor: Actor) -> bytes:
+        """An actor, as a snapshot has it: a sign always in the same way, as long as nobody moves it."""
+        if not (actor.sign and type(actor) is Actor):
+            return snapshot.actor_row(actor.id, actor.place, actor.motion, self._part(actor))
+        place, row = self._signs.get(actor.id, (None, b""))
+        if place is not actor.own_place:
+            row = snapshot.actor_row(actor.id, actor.place, actor.motion, self._part(actor))
+            self._signs[actor.id] = actor.own_place, row
+        return row
 
     def _part(self, actor: Actor) -> bytes:
         """What an actor's kind adds to its row."""

@@ -76,7 +76,8 @@ class LightKeeper:
     def __init__(self, actors: Sequence[Light], lights: TrafficLights) -> None:
         self.actors, self._lights = list(actors), lights
         self._stops = np.array([np.mean(one.post.stop_line, axis=0) for one in actors]).reshape(-1, 2)
-        self._headings = np.array([one.post.pose.heading for one in actors])
+        headings = np.array([one.post.pose.heading for one in actors])
+        self._cosines, self._sines = np.cos(headings), np.sin(headings)
         self.update(0.0)
 
     def of_junction(self, light: Light) -> list[Light]:
@@ -130,13 +131,15 @@ class LightKeeper:
         """The light that each of some vehicles is at."""
         if not poses or not self.actors:
             return [None] * len(poses)
-        at = np.array([(pose.x, pose.y, pose.heading) for pose in poses])
-        c, s = np.cos(self._headings), np.sin(self._headings)
-        dx, dy = at[:, :1] - self._stops[:, 0], at[:, 1:2] - self._stops[:, 1]
-        ahead, left = dx * c + dy * s, dy * c - dx * s
+        x, y, c, s = np.array([(pose.x, pose.y, math.cos(pose.heading), math.sin(pose.heading)) for pose in poses]).T[
+            ..., None
+        ]
+        dx, dy = x - self._stops[:, 0], y - self._stops[:, 1]
+        ahead, left = dx * self._cosines + dy * self._sines, dy * self._cosines - dx * self._sines
         inside = (ahead > -ZONE) & (ahead < 0.5) & (np.abs(left) < 2.0)
-        inside &= np.cos(at[:, 2:] - self._headings) > SAME_WAY
-        return [self.actors[int(np.argmax(row))] if row.any() else None for row in inside]
+        inside &= c * self._cosines + s * self._sines > SAME_WAY
+        at = np.where(inside.any(axis=1), inside.argmax(axis=1), -1).tolist()
+        return [self.actors[k] if k >= 0 else None for k in at]
 
     def part(self, light: Light, time: float) -> bytes:
         """What a light adds to a snapshot."""

@@ -19,6 +19,7 @@ from caldrive.carla_bridge.server.outbox import Log
 from caldrive.carla_bridge.server.radar import detections, radar_settings
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.snapshot import Sensor, header
+from caldrive.compiled import compiled
 from caldrive.datatypes import Semantic
 from caldrive.world.rendering.camera import CameraRig, SceneState
 from caldrive.world.rendering.pinhole import PinholeCamera
@@ -91,7 +92,9 @@ class Senses:
     def _rgb(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
         camera, scene = camera_of(sensor), episode.scene(sensor.place, sensor.parent)
         picture = self.rig.render_from([camera], scene)[0]
-        yield Sensor.RGB, _image(sensor, picture[..., ::-1])
+        pixels = np.empty((*picture.shape[:2], 4), np.uint8)
+        reordered(picture, pixels)
+        yield Sensor.RGB, _with_size(sensor, pixels)
 
     def _semantic(self, sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
         classes = self.rig.semantics_from(camera_of(sensor), episode.scene(sensor.place, sensor.parent))
@@ -178,4 +181,20 @@ def _image(sensor: SensorActor, picture: Any) -> Message:
     width, height = sensor.size
     out = np.full((height, width, 4), 255, np.uint8)
     out[..., :3] = picture
-    return [np.array([width, height], "<u4").tobytes() + np.array([sensor.fov], "<f4").tobytes(), out]
+    return _with_size(sensor, out)
+
+
+def _with_size(sensor: SensorActor, pixels: NDArray[np.uint8]) -> Message:
+    """An image (H, W, 4) behind its size."""
+    width, height = sensor.size
+    return [np.array([width, height], "<u4").tobytes() + np.array([sensor.fov], "<f4").tobytes(), pixels]
+
+
+@compiled
+def reordered(picture: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
+    """Writes an image of red, green, blue (H, W, 3) as blue, green, red and 255 (H, W, 4)."""
+    for row in range(picture.shape[0]):
+        for column in range(picture.shape[1]):
+            for channel in range(3):
+                out[row, column, channel] = picture[row, column, 2 - channel]
+            out[row, column, 3] = 255
