@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,13 @@ def require_limits(values: Mapping[str, Any], limits: Limits, usual: Mapping[str
     options, such as augmentation in --augmentation.blur."""
     for name, (low, high) in limits.items():
         require_within(f"--{group and group + '.'}{name.replace('_', '-')}", values[name], low, high, usual[name])
+
+
+def require_modules(extra: str, *modules: str) -> None:
+    """Raises RuntimeError where a module is missing that comes with an extra of this package."""
+    for name in modules:
+        if find_spec(name) is None:
+            raise RuntimeError(f"found no {name}, wanted it: type pip install 'caldrive[{extra}]'")
 
 
 class TooLargeError(ValueError):

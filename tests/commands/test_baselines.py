@@ -72,3 +72,13 @@ def test_a_training_that_there_is_not_is_named(tmp_path: Path) -> None:
     refused = run_json("baselines", "--only", "cil-7", "--out", str(tmp_path / "out"), code=2)
     assert "found --only cil-7, wanted one of mp-" in refused["error"]
     assert not (tmp_path / "out").exists()
+
+
+def test_what_a_training_needs_is_looked_for_before_the_first_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(baselines, "LEARNERS", ("gymnasium", "no_such_learner"))
+    out = str(tmp_path / "out")
+    refused = run_json("baselines", "--data", str(tmp_path), "--only", "rl-paper-0", "--out", out, code=2)
+    assert refused["error"] == "found no no_such_learner, wanted it: type pip install 'caldrive[rl]'"
+    assert not (tmp_path / "out" / "log.jsonl").exists()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -99,9 +99,9 @@ def test_what_was_written_is_read_again(recording: Path, written: Path) -> None:
     np.testing.assert_allclose(frames.control, clean, atol=1e-6)
     for name in ("speed", "camera_left", "camera_yaw"):
         np.testing.assert_allclose(getattr(frames, name), column(name), rtol=1e-6, atol=1e-7)
-    near = column("junction")
-    expected = [tuple(Command).index(Command(command)) for command in column("command")[near]]
-    assert frames.command[near].tolist() == expected
+    assert frames.is_ours
+    expected = [tuple(Command).index(Command(command)) for command in column("command")]
+    assert frames.command.tolist() == expected  # to follow the lane and to go straight on are one command of ours
 
 
 def test_no_images_are_no_images(written: Path) -> None:
@@ -141,22 +141,35 @@ def test_a_command_keeps_its_number_at_a_junction(command: Command, number: int,
     assert one_frame(tmp_path, command=command, junction=True)["command"] == number
 
 
-def drive(tmp_path: Path, speed: float, junctions: tuple[int, ...], n: int = 60) -> Episode:
-    """To the left, at a constant speed, 10 frames a second."""
+def commands_of(
+    tmp_path: Path, speed: float, command: Command, junctions: tuple[int, ...], frames: Iterable[int] = range(60)
+) -> list[float]:
+    """The format's commands of a drive at a constant speed, 10 frames a second."""
     with EpisodeWriter(tmp_path / "drive.parquet", SCENARIO) as writer:
-        for k in range(n):
-            writer.append(replace(make_frame(k), speed=speed, command=Command.LEFT, junction=k in junctions))
-    return read_episode(tmp_path / "drive.parquet")
+        for k in frames:
+            writer.append(replace(make_frame(k), speed=speed, command=command, junction=k in junctions))
+    found: list[float] = targets(read_episode(tmp_path / "drive.parquet"))[:, COLUMN["command"]].tolist()
+    return found
 
 
 def test_far_from_a_junction_the_command_is_to_follow_the_lane(tmp_path: Path) -> None:
-    commands = targets(drive(tmp_path, 10.0, junctions=(40, 41, 42)))[:, COLUMN["command"]]
-    assert commands[:20].tolist() == [2] * 20  # 40 to 21 m before it
-    assert commands[20:].tolist() == [3] * 40  # behind it the recording ends within 20 m
+    commands = commands_of(tmp_path, 10.0, Command.STRAIGHT, junctions=(40, 41, 42))
+    assert commands[:20] == [2] * 20  # 40 to 21 m before it
+    assert commands[20:] == [5] * 40  # behind it the recording ends within 20 m
+
+
+@pytest.mark.parametrize(("command", "number"), [(Command.LEFT, 3), (Command.RIGHT, 4)])
+def test_a_turn_that_was_told_far_from_its_junction_stays_one(command: Command, number: int, tmp_path: Path) -> None:
+    assert set(commands_of(tmp_path, 10.0, command, junctions=(40, 41, 42))) == {number}
 
 
 def test_a_car_that_waits_at_a_junction_keeps_its_command(tmp_path: Path) -> None:
-    assert set(targets(drive(tmp_path, 0.0, junctions=(59,)))[:, COLUMN["command"]]) == {3}
+    assert set(commands_of(tmp_path, 0.0, Command.STRAIGHT, junctions=(59,))) == {5}
+
+
+def test_what_lies_behind_a_gap_in_a_recording_is_not_known(tmp_path: Path) -> None:
+    frames = [*range(30), *range(60, 90)]  # 3 s are missing, in which the car may have met any junction
+    assert commands_of(tmp_path, 10.0, Command.STRAIGHT, (89,), frames)[:39] == [2] * 9 + [5] * 21 + [2] * 9
 
 
 def test_the_way_to_a_junction_is_what_the_car_drives() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import caldrive.gym.env
 from caldrive.agents.reinforcement.encoder import Encoder
-from caldrive.datatypes import CameraConfig, Observation, Pose
+from caldrive.datatypes import CameraConfig, Image, Observation, Pose
 from caldrive.reinforcement.config import ReinforcementConfig
 from caldrive.reinforcement.environment import LearningEnv, make_learning_env
 from caldrive.scenarios import Scenario
@@ -25,13 +26,21 @@ SHORT = ReinforcementConfig(
 class SeenRoad(StraightRoad):
     """A straight road whose image says how fast it is driven, in the camera's size."""
 
-    camera: CameraConfig | None = None
+    mount: CameraConfig | None = None
+    drawn = 0
+
+    def images(self, mounts: Sequence[CameraConfig]) -> list[Image]:
+        self.drawn += len(mounts)
+        return [self._picture(mount.height, mount.width) for mount in mounts]
 
     def _observation(self) -> Observation:
-        size = (self.camera.height, self.camera.width) if self.camera else (1, 1)
-        image = np.full((*size, 3), min(255, 40 + int(20 * self.ego.speed)), np.uint8)
-        image[::2] //= 2
+        image = self.images([self.mount])[0] if self.mount else np.zeros((1, 1, 3), np.uint8)
         return replace(super()._observation(), image=image)
+
+    def _picture(self, height: int, width: int) -> Image:
+        image = np.full((height, width, 3), min(255, 40 + int(20 * self.ego.speed)), np.uint8)
+        image[::2] //= 2
+        return image
 
 
 @pytest.fixture
@@ -40,7 +49,7 @@ def straight_road(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def make_road(camera: CameraConfig | None) -> SeenRoad:
         road = SeenRoad(light=20.0)
-        road.camera = camera
+        road.mount = camera
         return road
 
     monkeypatch.setattr(caldrive.gym.env, "make_world", make_road)

@@ -12,9 +12,9 @@ from caldrive.agents.cal import OraclePerception
 from caldrive.agents.reinforcement.agent import ReinforcementAgent
 from caldrive.agents.reinforcement.inputs import AffordanceEye, FrameEye, Inputs
 from caldrive.agents.reinforcement.policy import Policy
-from caldrive.datatypes import Control, Observation
+from caldrive.datatypes import DT, Control, Observation
 from caldrive.reinforcement.config import REINFORCEMENTS
-from caldrive.reinforcement.environment import policy_config
+from caldrive.reinforcement.environment import START_ACTIONS, policy_config
 from tests.reinforcement.data import ROAD, make_env, straight_road
 
 __all__ = ["straight_road"]
@@ -68,6 +68,24 @@ def test_a_decision_holds_and_its_rewards_add_up() -> None:
     seen, reward, *_ = thrice.step(action)
     assert reward == pytest.approx(sum(step[1] for step in single))
     assert (seen["numbers"] == single[-1][0]["numbers"]).all()
+
+
+@pytest.mark.parametrize("steps", [2, 3])
+def test_pictures_that_nobody_sees_are_not_drawn(steps: int) -> None:
+    """The road ends at a time limit, within a decision or with it."""
+    config = replace(REINFORCEMENTS["paper"], repeat=2)
+    scenario = replace(ROAD, time_limit=DT * (START_ACTIONS + steps))
+    sparing, lavish = make_env(config), make_env(config)
+    lavish.driving.draw = lambda draws: None  # type: ignore[method-assign]
+    for env in (sparing, lavish):
+        env.reset(seed=1, options={"scenario": scenario})
+    ended = False
+    while not ended:
+        (seen, *_, ended, _), (expected, *_) = sparing.step(0), lavish.step(0)
+        assert (seen["frames"] == expected["frames"]).all()
+        assert seen["frames"].any()
+    drawn = [env.driving._world.drawn for env in (sparing, lavish)]  # type: ignore[union-attr]
+    assert drawn[0] < drawn[1]
 
 
 def test_the_last_decision_is_seen() -> None:

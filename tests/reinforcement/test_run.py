@@ -29,6 +29,18 @@ def test_each_environment_has_its_process_and_one_that_dies_is_said_in_one_sente
     assert not any(process.is_alive() for process in several.processes)
 
 
+def test_a_process_that_dies_between_two_updates_is_said_and_never_waited_for() -> None:
+    config = replace(SHORT, processes=True, environments=2, save_every=1)  # new episodes begin with each update
+    run = LearningRun(config, policy_config(config, None), partial(make_learning_env, config, None))
+    several: Any = run.env.venv
+    several.processes[0].kill()
+    several.processes[0].join()
+    with pytest.raises(RuntimeError, match="the process of an environment has died"):
+        run.advance()
+    run.close()
+    assert not any(process.is_alive() for process in several.processes)
+
+
 def test_what_is_drawn_depends_on_seed_update_and_purpose() -> None:
     seeds = {derived_seed(s, k, why) for s in range(3) for k in range(5) for why in ("weights", "actions", "episodes")}
     assert len(seeds) == 45

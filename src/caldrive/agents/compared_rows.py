@@ -118,6 +118,11 @@ def _rl_provenance(settings: AgentSettings) -> dict[str, Any]:
     info, model = read_policy_info(path), file_digest(path)
     if info.policy.sees == "affordances":
         network = cal_provenance(AgentSettings())
+        if info.perception not in (None, network["model"]):
+            raise ValueError(
+                f"found in {path} a policy that learnt from the affordances of network {info.perception}, wanted that "
+                f"of {model_path(None)} ({network['model']}): train it with --preset predicted and no --perception"
+            )
         return network | {"model": f"{model} {network['model']}"}
     precision = driving_precision("auto", info.encoder.ranges) if info.encoder else None
     return {"model": model, "precision": precision}

@@ -15,8 +15,9 @@ from tyro.conf import UseAppendAction
 
 from caldrive.agents.conditional_imitation.config import IMITATION_NETWORKS, IMITATION_TRAININGS
 from caldrive.agents.modular_pipeline.config import PIPELINE_TRAININGS
+from caldrive.checks import require_modules, require_writable_folder
 from caldrive.commands.answer import Answer, Output
-from caldrive.commands.train import TrainImitation, TrainPipeline, TrainReinforcement
+from caldrive.commands.train import LEARNERS, TrainImitation, TrainPipeline, TrainReinforcement
 from caldrive.progress import Progress
 from caldrive.reinforcement.config import REINFORCEMENTS
 
@@ -68,13 +69,14 @@ class Baselines(Output):
 
     def run(self, progress: Progress) -> Answer:
         """Trains; answers with the networks' files."""
-        from caldrive.checks import require_writable_folder
         from caldrive.files import locked_folder
 
         if unknown := [name for name in self.only if name not in TRAININGS]:
             raise ValueError(f"found --only {unknown[0]}, wanted one of {', '.join(TRAININGS)}: type one of these")
         require_writable_folder(self.out)
         names = self.only or tuple(TRAININGS)
+        if any(name.startswith("rl-") for name in names):
+            require_modules("rl", *LEARNERS)  # now, and not after the first trainings
         with locked_folder(self.out):
             for number, name in enumerate(names):
                 if not (self.out / name / MODEL).is_file():

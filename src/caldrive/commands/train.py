@@ -21,11 +21,14 @@ from caldrive.agents.modular_pipeline.config import (
     PipelineConfig,
     SegmentationConfig,
 )
+from caldrive.checks import require_modules
 from caldrive.commands.answer import TYPED, Answer, Configurable, Output
 from caldrive.perception.network.config import NETWORKS, NetworkConfig
 from caldrive.perception.training.config import TRAININGS, TrainingConfig
 from caldrive.progress import Progress
 from caldrive.reinforcement.config import REINFORCEMENTS, ReinforcementConfig
+
+LEARNERS = ("gymnasium", "stable_baselines3")  # what learning by reinforcement needs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +158,7 @@ class TrainReinforcement(Configurable):
 
     def run(self, progress: Progress) -> Answer:
         """Trains; answers with the policy's file."""
+        require_modules("rl", *LEARNERS)
         from caldrive.reinforcement.train import train_rl
 
         return _trained(self, lambda: train_rl(self.training, self.out, progress))

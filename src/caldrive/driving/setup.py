@@ -67,10 +67,11 @@ def set_up(settings: AgentSettings, images: bool = False) -> tuple[World, Agent]
     """A world, and the agent for it. settings: a `DriverSettings` says in which world, others mean the embedded one.
     images: whether an agent that looks at none gets a camera, too.
 
-    Raises ValueError for an unknown agent, controller or world, FileNotFoundError or ValueError for a model that is no
-    use.
+    Raises ValueError for an unknown agent, controller or world, and for settings that the agent does not take,
+    FileNotFoundError or ValueError for a model that is no use.
     """
     entry = agent_entry(settings.agent)
+    entry.provenance(settings)  # refuses what the agent would not hear of
     camera = entry.camera(settings) or (CameraConfig() if images else None)
     auxiliary = entry.auxiliary(settings)
     where = settings if isinstance(settings, WorldSettings) else WorldSettings()

@@ -194,9 +194,11 @@ def measure_agent(settings: AgentSpeedSettings, progress: Progress = silent) -> 
     require_within("--threads", threads, 1, MOST_WORKERS, 2)
     entry = agent_entry(settings.agent)
     camera = entry.camera(settings) or CameraConfig()
-    world, milliseconds = make_world("embedded", camera), list[float]()
+    aside = entry.auxiliary(settings)
+    world = make_world("embedded", camera, **({"auxiliary": aside} if aside else {}))
+    knows, milliseconds = world.truth if entry.privileged else None, list[float]()
     with closing(world):
-        agent = make_cal(settings, DT, threads) if settings.agent == "cal" else entry.make(settings, DT, world.truth)
+        agent = make_cal(settings, DT, threads) if settings.agent == "cal" else entry.make(settings, DT, knows)
         reset_agent(agent)
         observation = start_drive(world, WorldSpeedSettings(steps=settings.steps))
         for i in range(WARM_UP + settings.steps):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import gymnasium
 
 from caldrive.agents.reinforcement.inputs import control_of
-from caldrive.datatypes import MAX_CENTER_DISTANCE, Control, Observation, Truth
+from caldrive.datatypes import MAX_CENTER_DISTANCE, CameraConfig, Control, Observation, Truth
 from caldrive.driving.referee import Referee
 from caldrive.driving.rules import RULES
 from caldrive.driving.setup import make_world
@@ -105,6 +105,19 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
         truncated = outcome is Outcome.TIMEOUT and not terminated
         return observed(self.config, observation, drive.truth), reward, terminated, truncated, info
 
+    def draw(self, draws: bool) -> None:
+        """Whether the next steps have an image, a black pixel else: for a learner that does not look at each."""
+        world: Any = self._open_world()
+        world.mount = self._camera if draws else None
+
+    def look(self) -> None:
+        """Draws the image of the last step, which had none."""
+        if self._camera is not None:
+            self.draw(True)
+            world: Any = self._open_world()
+            drive = self._current
+            drive.observation = replace(drive.observation, image=world.images([self._camera])[0])
+
     def drive_on(self, control: Control) -> bool:
         """A step with a control of somebody else's, without a reward; returns whether the episode has ended."""
         self._move(self._current, control, {})
@@ -170,9 +183,14 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
 
     def _open_world(self) -> World:
         if self._world is None:
-            draws = self.config.observation == "image" or self.render_mode is not None
-            self._world = make_world(camera=self.config.camera if draws else None)
+            self._world = make_world(camera=self._camera)
         return self._world
+
+    @property
+    def _camera(self) -> CameraConfig | None:
+        """The one that is looked through, if anybody does."""
+        draws = self.config.observation == "image" or self.render_mode is not None
+        return self.config.camera if draws else None
 
     @staticmethod
     def _info(drive: _Drive) -> dict[str, Any]:

@@ -40,6 +40,7 @@ COLUMNS = (
     "acceleration_y", "acceleration_z", "platform_time", "game_time", "orientation_x", "orientation_y", "orientation_z",
     "command", "noise", "camera", "camera_yaw",
 )  # fmt: skip
+OURS = "ours"  # a column that no file has: whether it says how far to the left a camera is
 FOLLOW = 2
 COMMAND_NUMBERS = {Command.LEFT: 3, Command.RIGHT: 4, Command.STRAIGHT: 5}
 COMMANDS = {number: command for command, number in COMMAND_NUMBERS.items()} | dict.fromkeys(
@@ -67,6 +68,8 @@ class DrivenFrames:
     """(N,), m to the left of the car's middle."""
     camera_yaw: NDArray[np.float64]
     """(N,), rad to the left."""
+    is_ours: bool = False
+    """Whether caldrive recorded them: its files say how far to the left a camera is."""
 
     def __len__(self) -> int:
         return len(self.speed)
@@ -108,12 +111,13 @@ def read_corl2017(folder: Path | str, progress: Progress = silent) -> DrivenFram
         ),
         camera_left=values[CAMERA_LEFT],
         camera_yaw=-np.radians(values["camera_yaw"]),
+        is_ours=bool(values[OURS].all()),
     )  # fmt: skip
 
 
 def read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
-    """What COLUMNS names (200,), in the file's own units, with `camera_left` in m. Raises EpisodeError where the file
-    cannot be right."""
+    """What COLUMNS names (200,), in the file's own units, with `camera_left` in m, and OURS. Raises EpisodeError where
+    the file cannot be right."""
     h5py = require_h5py()
     try:
         with h5py.File(path, "r") as file:
@@ -128,7 +132,7 @@ def read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
         raise
     except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
         raise _damaged(path) from error
-    columns = dict(zip(COLUMNS, targets.T, strict=True)) | {CAMERA_LEFT: left}
+    columns = dict(zip(COLUMNS, targets.T, strict=True)) | {CAMERA_LEFT: left, OURS: np.full(FRAMES, float(has_left))}
     for name, largest in LARGEST.items():
         if not (np.abs(columns[name]) <= largest).all():  # NaN is not, either
             raise EpisodeError(f"found values of {name} in {path} that cannot be, wanted a drive's: remove the file")

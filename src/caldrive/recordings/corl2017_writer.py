@@ -42,6 +42,7 @@ from caldrive.recordings.writer import EpisodeError
 from caldrive.scenarios import require_to_learn_from
 
 FOLLOW_DISTANCE = 20.0  # m before a junction at which the command to follow the lane ends: our choice
+GAP = 5.0  # m from frame to frame: a junction may lie between them
 CENTER, LEFT, RIGHT = 0, 1, 2  # cameras' numbers
 DESCRIPTION = "corl2017.json"  # of a folder of files: what they were made of
 
@@ -112,28 +113,30 @@ def targets(episode: Episode) -> NDArray[np.float32]:
 
 
 def _commands(episode: Episode) -> NDArray[np.int64]:
-    """The format's command of each frame (N,): to follow the lane where the next junction is more than FOLLOW_DISTANCE
-    away, where ours is straight. Where a recording ends before that is known,
-    the command stays."""
+    """The format's command of each frame (N,): to follow the lane where ours is straight and the next junction more
+    than FOLLOW_DISTANCE away. Where a recording ends before that is known, the command stays."""
     columns = episode.columns
     numbers = np.array([COMMAND_NUMBERS[Command(command)] for command in columns["command"]])
     for camera in np.unique(columns["camera"]):
         rows = columns["camera"] == camera
         ahead = distance_to_junction(*(columns[name][rows] for name in ("time", "speed", "junction")))
-        numbers[rows] = np.where(ahead > FOLLOW_DISTANCE, FOLLOW, numbers[rows])
+        is_straight = numbers[rows] == COMMAND_NUMBERS[Command.STRAIGHT]
+        numbers[rows] = np.where(is_straight & (ahead > FOLLOW_DISTANCE), FOLLOW, numbers[rows])
     return numbers
 
 
 def distance_to_junction(
     time: NDArray[np.float64], speed: NDArray[np.float64], junction: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """How far (N,), m, the car goes on from each frame until it is inside a junction, or the recording ends.
+    """How far (N,), m, the car goes on from each frame until it is inside a junction, or the recording ends or has a
+    gap.
 
     time (N,) s; speed (N,) m/s; junction (N,): whether it is inside one.
     """
     steps = np.diff(time) * (speed[1:] + speed[:-1]) / 2
     travelled = np.concatenate(([0.0], np.cumsum(steps)))
-    ends = np.union1d(np.flatnonzero(junction), len(time) - 1)
+    gaps = np.flatnonzero(np.diff(time) * np.maximum(speed[1:], speed[:-1]) > GAP)
+    ends = np.unique(np.concatenate((np.flatnonzero(junction), gaps, [len(time) - 1])))
     distance: NDArray[np.float64] = travelled[ends[np.searchsorted(ends, np.arange(len(time)))]] - travelled
     return distance
 

@@ -63,12 +63,16 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, dict[str, Any], Any]):
         """Drives on while the decision holds, or until the episode ends; the rewards add up."""
         total, speed = 0.0, self.driving.observation.speed
         for k in range(self._policy.repeat):
-            if k:
+            if k and self._inputs.eye.remembers:
                 self._watch()
+            draws = self._inputs.eye.remembers or k + 1 == self._policy.repeat
+            self.driving.draw(draws)
             _, reward, terminated, truncated, info = self.driving.step(action)
             total += reward
             if terminated or truncated:
                 break
+        if not draws:
+            self.driving.look()
         self._inputs.acted(control_of(self._policy.action, action, speed))
         if terminated and info["is_success"] and self.driving.config.reward == "roach":
             terminated, truncated = False, True  # the road goes on behind the goal, which the policy does not see

@@ -6,7 +6,7 @@ episodes: a run that is killed anywhere resumes to the same weights.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from statistics import fmean
@@ -93,30 +93,33 @@ class LearningRun:
 
     def advance(self) -> Row:
         """One update; returns its metrics."""
-        if self.at_save_point:
-            self._begin_episodes()
-        set_random_seed(derived_seed(self.config.seed, self.update, "actions"))
         notes = _Notes(self.env)
         with _living_processes():
+            if self.at_save_point:
+                self._begin_episodes()
+            set_random_seed(derived_seed(self.config.seed, self.update, "actions"))
             self.model.learn(self.config.update_steps, notes, log_interval=LATER, reset_num_timesteps=False)
-        self.update += 1
-        for ended in notes.ended:
-            if self.curriculum.note(ended.task, ended.success):
-                self._set_tasks()
-        if self.curriculum.keep_up(self.update / self.config.updates):
-            self._set_tasks()
+            self.update += 1
+            self._follow_curriculum(notes.ended)
         logged = self.model.logger.name_to_value
         return {"step": self.steps, **self._figures(notes), **_losses(logged)}
 
     def close(self) -> None:
         """Ends the environments and their processes."""
         several: Any = self.env.venv
-        if not getattr(several, "waiting", False):
+        processes = getattr(several, "processes", [])
+        if not getattr(several, "waiting", False) and all(process.is_alive() for process in processes):
             self.env.close()
             return
-        for process in several.processes:  # one has died, or was interrupted: to wait for its answer may take for ever
+        for process in processes:  # one has died, or was interrupted: to wait for its answer may take for ever
             process.terminate()
             process.join()
+
+    def _follow_curriculum(self, ended: Sequence[Ended]) -> None:
+        """The next task where it is time for it. ended: the episodes of an update."""
+        moves_on = [self.curriculum.note(one.task, one.success) for one in ended]
+        if any(moves_on) | self.curriculum.keep_up(self.update / self.config.updates):
+            self._set_tasks()
 
     def _begin_episodes(self) -> None:
         """New episodes in all environments, from seeds that follow from the update."""

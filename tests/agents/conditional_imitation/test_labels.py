@@ -65,6 +65,8 @@ def test_every_command_has_the_same_share_of_a_batch() -> None:
     sampler = CommandSampler(frames_of([0] * 90 + [1] * 5 + [2] * 5, [0.0] * 100), balance=0.0, seed=1)
     commands = np.array([0] * 90 + [1] * 5 + [2] * 5)[sampler.draw(3, 64)]
     assert sorted(np.bincount(commands)) == [21, 21, 22]
+    half = commands[::2]  # what the first of two processes has that share a batch
+    assert min(np.bincount(half)) > 4
     assert (sampler.draw(3, 64) == sampler.draw(3, 64)).all()
     assert (sampler.draw(3, 64) != sampler.draw(4, 64)).any()
 

@@ -76,6 +76,18 @@ def test_a_free_road_is_driven_and_somebody_on_it_stops_the_car() -> None:
     assert "m² in the way" in agent.decision.note
 
 
+def test_a_turn_goes_on_behind_an_image_that_is_no_use() -> None:
+    """The planner's memory lies in the car's frame, and the car moves on while nothing is seen."""
+    agent = true_agent()
+    for _ in range(5):
+        agent.act(seen(picture(near=True), Command.LEFT))
+    before = agent._memory
+    agent.act(seen(np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8), Command.LEFT, speed=10.0))
+    assert before.turn is not None
+    assert agent._memory.turn is not None
+    assert agent._memory.turn.exit.x < before.turn.exit.x - 0.5  # 10 m/s for a step of 0.1 s
+
+
 def test_a_cap_is_kept() -> None:
     agent = true_agent()
     assert agent.cruise == CRUISE
@@ -176,6 +188,8 @@ def test_mp_asks_for_a_second_camera_as_a_variant(model: Path) -> None:
         provenance(replace(settings, variant="two"))
     with pytest.raises(ValueError, match=r"found --controller paper, but the agent mp takes none"):
         provenance(replace(settings, controller="paper"))
+    with pytest.raises(ValueError, match=r"found --variant two"):
+        set_up(replace(settings, variant="two"))  # also where nobody asks for its provenance
 
 
 def test_a_world_without_a_second_camera_is_refused() -> None:

@@ -182,6 +182,13 @@ def test_the_row_asks_for_the_camera_that_the_policy_looks_through(tmp_path: Pat
         row.provenance(replace(settings, controller="paper"))
 
 
+def test_a_policy_that_learnt_from_another_network_is_refused(tmp_path: Path) -> None:
+    path, config = tmp_path / "rl.safetensors", PolicyConfig(hidden=16)
+    save_policy(path, lively(config), PolicyInfo(config, perception="0123456789abcdef"))
+    with pytest.raises(ValueError, match="learnt from the affordances of network 0123456789abcdef, wanted that of"):
+        set_up(AgentSettings(agent="rl", model=path))
+
+
 def test_a_policy_on_affordances_drives_by_cals_network_or_by_the_truth(tmp_path: Path) -> None:
     path, config = tmp_path / "rl.safetensors", PolicyConfig(hidden=16)
     save_policy(path, lively(config), PolicyInfo(config))

@@ -86,9 +86,9 @@ class ImitationConfig(LoopConfig):
     inverse proportion to the frequency of their steering."""
     weights: ImitationWeights = ImitationWeights()
     """What each squared error counts."""
-    wheel_angle: float = 35.0
-    """Angle of the front wheels at full steering, degrees, of the car that was recorded; of CARLA's 70. The labels of
-    cameras aside depend on it."""
+    wheel_angle: float | None = None
+    """Angle of the front wheels at full steering, degrees, of the car that was recorded. The labels of cameras aside
+    depend on it. Without it 35 for recordings of caldrive, 70, as CARLA's car has, for HDF5 files of others."""
     published_augmentation: bool = True
     """The augmentation that the authors of the released agent posted, in the place of CAL's."""
     recolour: RecolourConfig = RecolourConfig(enabled=False)
@@ -96,7 +96,8 @@ class ImitationConfig(LoopConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_within("--wheel-angle", self.wheel_angle, 1.0, 90.0, 35.0)
+        if self.wheel_angle is not None:
+            require_within("--wheel-angle", self.wheel_angle, 1.0, 90.0, 35.0)
         if self.published_augmentation and self.recolour.enabled:
             raise ValueError(
                 "found the published augmentation beside CAL's recolouring, wanted one of them: type "

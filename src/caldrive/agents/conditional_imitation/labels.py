@@ -116,10 +116,11 @@ class CommandSampler:
             self._cumulative.append(np.cumsum(weight))
 
     def draw(self, step: int, n: int) -> Ids:
-        """n frames; where n is no multiple of the commands, the first of them have one more."""
-        chances = np.random.default_rng((self.seed, step)).random(n)
+        """n frames, the commands among each other; where n is no multiple of them, the first ones have one more."""
+        rng = np.random.default_rng((self.seed, step))
+        chances = rng.random(n)
         drawn = np.empty(n, np.int64)
         for number, (ids, cumulative) in enumerate(zip(self._ids, self._cumulative, strict=True)):
             mine = slice(number, None, len(COMMANDS))
             drawn[mine] = weighted(ids, cumulative, chances[mine])
-        return drawn
+        return rng.permutation(drawn)  # several processes that share a batch out in turn have all commands each

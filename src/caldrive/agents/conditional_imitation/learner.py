@@ -36,6 +36,7 @@ from caldrive.recordings.corl2017 import FOLDERS, HEIGHT, WIDTH, read_corl2017
 from caldrive.recordings.folder import episode_paths
 
 FRAMES_A_PASS = 64
+WHEEL_ANGLE, CARLA_WHEEL_ANGLE = 35.0, 70.0  # degrees at full steering: of the embedded car, of CARLA's
 RANGE_FRAMES = 512  # on which the ranges of 8 bits are found
 
 
@@ -56,13 +57,24 @@ def train_imitation(
     group = join_process_group(config.device, config.batch)
     is_hdf5 = all((data / name).is_dir() for name in FOLDERS)
     if not is_hdf5:
-        episode_paths(data)  # without one, no folder is made
+        _require_recording(data)  # without one, no folder is made
 
     def make_learner() -> ImitationLearner:
         read = _read_corl2017 if is_hdf5 else _read_recording
         return start(config, network, read(config, network, data), group.device)
 
     return run_training(make_learner, out, group, progress, stop)
+
+
+def _require_recording(data: Path) -> None:
+    """Raises ValueError where a folder holds no recorded episodes: HDF5 files want both of their folders."""
+    for folder in (data, data / FOLDERS[0], data / FOLDERS[1]):
+        if any(folder.glob("*.h5")):
+            raise ValueError(
+                f"found HDF5 files in {folder}, wanted {FOLDERS[0]} and {FOLDERS[1]} beside each other: "
+                "type --data with the folder that holds both"
+            )
+    episode_paths(data)
 
 
 @dataclass(frozen=True)
@@ -77,7 +89,7 @@ class ImitationData:
 
 def _read_recording(config: ImitationConfig, network: ImitationNetworkConfig, data: Path) -> ImitationData:
     """A folder of recorded episodes."""
-    frames, wheel = read_frames(config, network.image_size, data), math.radians(config.wheel_angle)
+    frames, wheel = read_frames(config, network.image_size, data), math.radians(config.wheel_angle or WHEEL_ANGLE)
     keys = tuple(sorted({episode.key for episode in frames.validation.episodes}))
     training, validation = (recorded_demonstrations(part, wheel) for part in (frames.training, frames.validation))
     return ImitationData(training, validation, keys)
@@ -90,8 +102,9 @@ def _read_corl2017(config: ImitationConfig, network: ImitationNetworkConfig, dat
             f"found HDF5 files of {WIDTH} x {HEIGHT} pixels in {data}, wanted {network.image_width} x "
             f"{network.image_height} for the network: leave --network.image-width and --network.image-height out"
         )
-    wheel = math.radians(config.wheel_angle)
-    training, validation = (corl2017_demonstrations(read_corl2017(data / name), wheel) for name in FOLDERS)
+    parts = [read_corl2017(data / name) for name in FOLDERS]
+    wheel = math.radians(config.wheel_angle or (WHEEL_ANGLE if parts[0].is_ours else CARLA_WHEEL_ANGLE))
+    training, validation = (corl2017_demonstrations(part, wheel) for part in parts)
     return ImitationData(training, validation)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from caldrive.agents.modular_pipeline.ground import GroundGrid, GroundView
-from caldrive.agents.modular_pipeline.planner import Memory, Plan, State, plan
+from caldrive.agents.modular_pipeline.planner import Memory, Plan, State, plan, seen_from
 from caldrive.agents.modular_pipeline.pursuit import PursuitState, motion, pursue, wheel_angle
 from caldrive.agents.modular_pipeline.scene import SceneClass, Segmenter
 from caldrive.datatypes import CameraConfig, Control, Decision, Observation, Points
@@ -75,6 +75,7 @@ class ModularPipelineAgent:
         try:
             grid, junction = self._see(observation)
         except BadImage as error:
+            self._memory = seen_from(self._memory, moved)
             self.decision = Decision(replace(STOP, steer=self._steer), note=str(error))
             return self.decision.control
         found = plan(grid, junction, observation.command, moved, self._memory)

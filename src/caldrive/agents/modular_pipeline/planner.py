@@ -98,7 +98,7 @@ class Plan:
 
 def plan(grid: GroundGrid, junction: float, command: Command, motion: Pose, memory: Memory) -> Plan:
     """The next plan. motion: the car's pose in the frame that it had at the last one."""
-    memory = _seen_from(memory, motion)
+    memory = seen_from(memory, motion)
     smoothed = memory.junction + SMOOTHING * (junction - memory.junction)
     done = memory.done and command is not Command.STRAIGHT and smoothed > NO_JUNCTION
     near = smoothed > JUNCTION
@@ -114,7 +114,7 @@ def plan(grid: GroundGrid, junction: float, command: Command, motion: Pose, memo
     return Plan(state, memory.edge.beside(EDGE_DISTANCE, AHEAD), replace(memory, state=state))
 
 
-def _seen_from(memory: Memory, motion: Pose) -> Memory:
+def seen_from(memory: Memory, motion: Pose) -> Memory:
     """The memory from where the car is now."""
     turn = memory.turn
     if turn is not None:

@@ -100,4 +100,5 @@ def load_agent(path: Path, perception: MakePerception, cap: float | None = None)
     """The agent of a file. perception: as in `make_eye`; cap: km/h. Raises CheckpointError where the file is no
     policy."""
     policy, info, encoder = load_policy(path)
+    torch.set_num_threads(1)  # a policy is small, and others drive beside it
     return ReinforcementAgent(policy, make_eye(info.policy, encoder, perception), cap)

@@ -34,7 +34,8 @@ class Encoder:
 
 
 def load_encoder(path: Path) -> Encoder:
-    """The backbone of the modular pipeline's network, which learnt segmentation alone. Raises CheckpointError where the
+    """The backbone of the modular pipeline's network, which learnt to segment, and to tell junctions.
+    Raises CheckpointError where the
     file is none."""
     network, info = load_segmentation(path)
     return Encoder(network.backbone, info.config.image_size, info.ranges)
@@ -43,8 +44,8 @@ def load_encoder(path: Path) -> Encoder:
 def encode_function(encoder: Encoder, threads: int = 1) -> Encode:
     """What makes features (F,) of an image (H, W, 3) in bytes, in this processor's fastest precision."""
     precision = driving_precision("auto", encoder.ranges)
-    if precision in INTEGERS:
-        torch.set_num_threads(1)  # torch's own would wait for one another beside OpenVINO's
+    # Beside OpenVINO's threads torch's own would wait for one another.
+    torch.set_num_threads(1 if precision in INTEGERS else threads)
     backbone = deepcopy(encoder.backbone).eval()  # bf16 turns it, and the encoder is saved with the policy
     engine = backbone_engine(precision, backbone, encoder.image_size, encoder.ranges, threads)
 

@@ -32,7 +32,9 @@ CARLA2017_FASTEST = 30.0 * KMH  # m/s
 
 
 class Eye(Protocol):
-    """What a policy has of the image."""
+    """What a policy has of the image. remembers: whether it has to look at each step, also without a decision."""
+
+    remembers: bool
 
     def reset(self) -> None:
         """Start an episode."""
@@ -49,6 +51,8 @@ class Eye(Protocol):
 
 class AffordanceEye:
     """Sees the affordances that a perception finds: a network's, or in training the true ones."""
+
+    remembers = True
 
     def __init__(self, perception: Perception) -> None:
         self.perception = perception
@@ -71,6 +75,8 @@ class AffordanceEye:
 class FrameEye:
     """Sees the last two frames, grey (the CARLA paper's supplement, S.2.3); at the start the first one twice."""
 
+    remembers = False
+
     def __init__(self) -> None:
         self._frames: NDArray[np.uint8] | None = None
 
@@ -92,6 +98,8 @@ class FrameEye:
 
 class FeatureEye:
     """Sees the features of a frozen encoder."""
+
+    remembers = False
 
     def __init__(self, encode: Encode, image_size: tuple[int, int]) -> None:
         self._encode, self._image_size = encode, image_size
