@@ -17,6 +17,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from caldrive.agents.rows import MODELS
+from caldrive.commands.baselines import TRAININGS
 from caldrive.files import write_whole
 from caldrive.provenance import code_version
 
@@ -33,23 +35,58 @@ WITHOUT = {  # drivers who know the truth but for something
     "oracle-without-signs": [*ORACLE, "--blind", "speed_sign", "--signs", "--controller", FAST],
     "oracle-with-signs": [*ORACLE, "--signs"],
 }
+# The paper's other systems: the network of each kind that ships, and every variant and seed that `caldrive baselines`
+# makes.
+SHIPPED = {kind: ["--agent", kind] for kind in ("mp", "cil", "rl")}
+VARIANTS = {
+    "cil-avoid-stopping": ["--agent", "cil", "--variant", "avoid-stopping"],
+    "mp-auxiliary-camera": ["--agent", "mp", "--variant", "auxiliary-camera"],
+}
+TRAINED = {
+    name: ["--agent", name.partition("-")[0], "--model", f"out/baselines/{name}/model.safetensors"]
+    for name in TRAININGS
+}
+BY_THE_TRUTH = {
+    f"{name}-by-the-truth": ["--agent", "rl-oracle", *words[2:]]
+    for name, words in TRAINED.items()
+    if name.startswith("rl-affordances")
+}
+SYSTEMS = {**AGENTS, **SHIPPED}
+ALL_SYSTEMS = {**SYSTEMS, **VARIANTS, **TRAINED, **BY_THE_TRUTH}
 SUITES = {  # who drives in each; those that come first are known to the later ones
     "dynamic": {**AGENTS, **WITHOUT},
-    "unseen": {**AGENTS, **WITHOUT},
+    "unseen": {**AGENTS, **WITHOUT, **SHIPPED, **VARIANTS, **TRAINED, **BY_THE_TRUTH},
     "unseen-wide": AGENTS,
-    "corl2017": AGENTS,
+    "corl2017": SYSTEMS,
     "nocrash": AGENTS,
     "traffic-school": AGENTS,
+    "corl2017-once": ALL_SYSTEMS,
+    "nocrash-once": SYSTEMS,
 }
-KNOWN = {"corl2017": ("dynamic",), "traffic-school": ("nocrash",)}
+KNOWN = {
+    "corl2017": ("dynamic",), "traffic-school": ("nocrash",), "corl2017-once": ("corl2017", "dynamic"),
+    "nocrash-once": ("nocrash",),
+}  # fmt: skip
 
 
 def chosen(only: list[str]) -> Iterator[tuple[str, str]]:
-    """The suites and drivers that words such as `unseen/oracle` or `nocrash` name; all for none."""
+    """The suites and drivers that words such as `unseen/oracle` or `nocrash` name; all for none. Raises SystemExit for
+    a word that names nothing."""
+    known = {*SUITES, *(f"{suite}/{driver}" for suite, drivers in SUITES.items() for driver in drivers)}
+    if unknown := sorted(set(only) - known):
+        raise SystemExit(f"found --only {unknown[0]}, wanted a suite ({', '.join(SUITES)}) or SUITE/DRIVER: type one")
     for suite, drivers in SUITES.items():
         for driver in drivers:
             if not only or suite in only or f"{suite}/{driver}" in only:
                 yield suite, driver
+
+
+def network(suite: str, driver: str) -> Path | None:
+    """The file of the network of one of the paper's other systems, None for another driver."""
+    words = SUITES[suite][driver]
+    if "--model" in words:
+        return Path(words[words.index("--model") + 1])
+    return MODELS / f"{words[1]}.safetensors" if words[1] in SHIPPED else None
 
 
 def drive(suite: str, driver: str, workers: str) -> None:
@@ -99,7 +136,10 @@ def main() -> int:
     options = parser.parse_args()
     runs = list(chosen(options.only))
     for suite, driver in [] if options.keep else runs:
-        drive(suite, driver, options.workers)
+        if (file := network(suite, driver)) and not file.is_file():
+            print(f"left out {suite}/{driver}: there is no {file}, see caldrive baselines", flush=True)
+        else:
+            drive(suite, driver, options.workers)
     for suite in dict.fromkeys(suite for suite, _ in runs):
         if drivers := [name for name in SUITES[suite] if (OUT / suite / name / "results.jsonl").exists()]:
             keep(suite, drivers)

@@ -29,7 +29,9 @@ from scripts.small_disk import SmallDisk
 
 WAYS = ("clock", "write", "full")
 # Lines that say when and how fast something was done differ between any two runs, and so does where it lies.
-EXEMPT = (rb'"began": "[^"]*"', rb'"windows_per_s": [\d.e+-]+', rb'"suite": "/[^"]*"')
+EXEMPT = (rb'"began": "[^"]*"', rb'"(windows|steps)_per_s": [\d.e+-]+', rb'"suite": "/[^"]*"')
+
+SMALL = "--steps 4 --batch 6 --save-every 1 --evaluate-every 2 --device cpu --precision fp32 --validation-share 0.5"
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,14 @@ WORKS = (
          "recording", ("recording.toml",)),
     Work("train", "train --data recording --out training --config training.toml --steps 6 --history-steps 4"
          " --evaluate-every 3", "training", ("recording", "training.toml")),
+    Work("collect-turns", "collect --out turns --config recording.toml --workers 1 --episodes 32 --duration 4"
+         " --width 96 --height 96", "turns", ("recording.toml",)),
+    Work("train-cil", f"train --agent cil --data turns --out cil {SMALL} --network.nodes 16"
+         " --network.image-width 96 --network.image-height 96", "cil", ("turns",)),
+    Work("train-mp", f"train --agent mp --data turns --out mp {SMALL} --network.width 0.125"
+         " --network.image-width 96 --network.image-height 96", "mp", ("turns",)),
+    Work("train-rl", "train --agent rl --preset affordances --out rl --processes False --environments 1"
+         " --steps 64 --rollout 16 --batch 16 --epochs 1 --hidden 8 --save-every 1 --device cpu", "rl", ()),
     Work("benchmark", "benchmark --suite suite.json --agent oracle --workers 1 --out run", "run", ("suite.json",)),
     Work("report", "report run --out report", "report", ("run", "suite.json")),
 )  # fmt: skip

@@ -57,6 +57,12 @@ def test_nocrash_is_driven_three_times_in_other_traffic() -> None:
     assert first.scenario.seed != second.scenario.seed
 
 
+def test_nocrash_once_is_the_first_of_its_three_seeds() -> None:
+    once, whole = suite("nocrash-once"), suite("nocrash")
+    assert once == [trial for trial in whole if trial.repetition == 0]
+    assert len(once) == 900
+
+
 def test_nocrash_takes_no_other_time_limit() -> None:
     with pytest.raises(ValueError, match=r"found --time-limit code, wanted none: NoCrash's .* leave it out"):
         suite("nocrash", time_limit="code")

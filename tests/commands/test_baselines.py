@@ -61,11 +61,12 @@ def test_what_is_there_is_kept_and_a_run_that_was_stopped_goes_on(
     monkeypatch.setattr(FakeTraining, "killed", None)
     assert verb.run(silent).values["models"]["three"] == str(tmp_path / "out" / "three" / "model.safetensors")
     lines = [json.loads(line) for line in (tmp_path / "out" / "log.jsonl").read_text().splitlines()]
-    assert [(line["training"], line["done"]) for line in lines] == [
+    assert [(line["training"], line["done"]) for line in lines if "done" in line] == [
         ("one", True), ("two", False), ("two", True), ("three", True),
     ]  # fmt: skip
+    assert [line["training"] for line in lines if "began" in line] == ["one", "two", "two", "three"]
     replace(verb, only=("two",)).run(silent)
-    assert len((tmp_path / "out" / "log.jsonl").read_text().splitlines()) == 4
+    assert len((tmp_path / "out" / "log.jsonl").read_text().splitlines()) == 8
 
 
 def test_a_training_that_there_is_not_is_named(tmp_path: Path) -> None:

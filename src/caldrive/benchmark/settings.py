@@ -15,8 +15,8 @@ class BenchmarkSettings(DriverSettings):
 
     suite: str = "quick"
     """corl2017, corl2017-once (each of its routes in one weather only), dynamic (its fourth task only), nocrash,
-    traffic-school, quick, unseen and unseen-wide (generated towns that nobody tuned to), generated (others, to develop
-    on), or a .json file with trials."""
+    nocrash-once (the first of its three seeds), traffic-school, quick, unseen and unseen-wide (generated towns that
+    nobody tuned to), generated (others, to develop on), or a .json file with trials."""
     out: Path = Path("out/benchmark")
     """Folder for results.jsonl, a line an episode, and run.json, which says what drove."""
     known: tuple[Path, ...] = ()

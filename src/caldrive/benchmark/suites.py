@@ -126,10 +126,10 @@ def _quick(seed: int, time_limit: str, towns: Towns) -> list[Trial]:
     return [trial for trial in trials if trial.scenario.weather in QUICK_WEATHERS]
 
 
-def _nocrash(seed: int, fatal: tuple[InfractionKind, ...], towns: Towns) -> Iterator[Trial]:
-    """The NoCrash benchmark: its routes in each density of traffic, with infractions that end an episode, three times
-    with other traffic."""
-    for repetition in range(NOCRASH_SEEDS):
+def _nocrash(seed: int, fatal: tuple[InfractionKind, ...], towns: Towns, repetitions: int) -> Iterator[Trial]:
+    """The NoCrash benchmark: its routes in each density of traffic, with infractions that end an episode, several
+    times with other traffic."""
+    for repetition in range(repetitions):
         for condition, town, weather in _by_weather(NOCRASH_NEW_WEATHERS):
             for density, traffic in DENSITIES.items():
                 cars, people = traffic[town]
@@ -152,10 +152,12 @@ def _require_own_time_limit(time_limit: str) -> None:
         )
 
 
-def _nocrash_suite(fatal: tuple[InfractionKind, ...]) -> Callable[[int, str, Towns], list[Trial]]:
+def _nocrash_suite(
+    fatal: tuple[InfractionKind, ...], repetitions: int = NOCRASH_SEEDS
+) -> Callable[[int, str, Towns], list[Trial]]:
     def trials(seed: int, time_limit: str, towns: Towns) -> list[Trial]:
         _require_own_time_limit(time_limit)
-        return list(_nocrash(seed, fatal, towns))
+        return list(_nocrash(seed, fatal, towns, repetitions))
 
     return trials
 
@@ -171,6 +173,7 @@ SUITES: Mapping[str, Callable[[int, str, Towns], list[Trial]]] = {  # by name; o
     "corl2017-once": _corl2017_once,
     "dynamic": _dynamic,
     "nocrash": _nocrash_suite(COLLISIONS),
+    "nocrash-once": _nocrash_suite(COLLISIONS, repetitions=1),
     "traffic-school": _nocrash_suite(TRAFFIC_RULES),
     "quick": _quick,
     **{name: partial(_generated, name) for name in GENERATED_SUITES},

@@ -63,7 +63,7 @@ class Baselines(Output):
     data: Path = Path("out/recording")
     """Folder with the recorded episodes, with semantic images: those that CAL learns from."""
     out: Path = Path("out/baselines")
-    """Folder with a folder for each training, and log.jsonl with the time that each took."""
+    """Folder with a folder for each training, and log.jsonl, which says when each began and how long it took."""
     only: UseAppendAction[tuple[str, ...]] = ()
     """A training to make, such as cil-published-0; may be given again. Without it all of them."""
 
@@ -85,15 +85,19 @@ class Baselines(Output):
         return Answer({"models": models}, "\n".join(f"{name}: {path}" for name, path in models.items()))
 
     def _train(self, name: str, progress: Progress) -> None:
-        """One training, and a line in the log: when it began, or went on, how long it took, and whether it is done."""
-        began, clock = datetime.now(UTC).isoformat(timespec="seconds"), time.perf_counter()
+        """One training, and two lines in the log: when it began, or went on; and how long that took, and whether it is
+        done, which is missing where it was killed."""
+        clock = time.perf_counter()
+        self._log({"training": name, "began": datetime.now(UTC).isoformat(timespec="seconds")})
         try:
             TRAININGS[name](self.data, self.out / name).run(progress)
         finally:
-            line: dict[str, object] = {"training": name, "began": began}
-            line |= {"seconds": round(time.perf_counter() - clock), "done": (self.out / name / MODEL).is_file()}
-            with (self.out / LOG).open("a") as log:
-                log.write(json.dumps(line) + "\n")
+            seconds, done = round(time.perf_counter() - clock), (self.out / name / MODEL).is_file()
+            self._log({"training": name, "seconds": seconds, "done": done})
+
+    def _log(self, line: dict[str, object]) -> None:
+        with (self.out / LOG).open("a") as log:
+            log.write(json.dumps(line) + "\n")
 
 
 def _part(progress: Progress, prefix: str, label: str, share: float) -> None:

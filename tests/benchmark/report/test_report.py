@@ -144,7 +144,7 @@ def test_failures_say_what_was_wrong_before(runs: list[BenchmarkRun]) -> None:
 
 def test_one_of_a_kind_stands_in_the_singular(runs: list[BenchmarkRun]) -> None:
     text = report_text([replace(runs[0], results=runs[0].results[:5])])
-    assert "1 infraction in 1 km" in text
+    assert "1 infraction of its own fault in 1 km" in text
     assert "1 episode missed its goal" in text
 
 
@@ -303,6 +303,18 @@ def test_a_folder_of_a_compressed_file_alone_is_reported_with_all_that_is_wrong_
         assert said in text
 
 
+def test_cal_is_compared_with_each_of_the_others_wherever_it_stands(runs: list[BenchmarkRun], tmp_path: Path) -> None:
+    oracle, cal, own = replace(runs[0], name="oracle"), replace(runs[0], name="cal"), replace(runs[0], name="own")
+    table = next(table for table in tables([oracle, cal, own]) if table.title == "Paired comparison")
+    assert table.head[4:6] == ("cal alone", "other alone")
+    assert {row[2] for row in table.rows} == {"oracle", "own"}
+    whole = next(row for row in table.rows if row[:3] == ("all", "all", "oracle"))
+    assert sum(map(int, whole[3:7])) == len(cal.results)
+    assert whole[4:6] == ("0", "0")
+    first_of_two = next(table for table in tables([oracle, own]) if table.title == "Paired comparison")
+    assert first_of_two.head[4] == "oracle alone"
+
+
 def test_a_name_from_a_file_stays_in_its_cell_of_a_table(runs: list[BenchmarkRun]) -> None:
     text = report_text([replace(runs[0], name="own | agent\nof mine")])
     assert "| own \\| agent of mine |" in text
@@ -314,7 +326,7 @@ def test_problems_of_a_run_stand_in_the_report_and_in_its_headline(tmp_path: Pat
     text = report_text([sound, broken])
     assert "| own | unfinished: 3 of 32 |" in text
     first = text.splitlines()[2]
-    assert first.startswith("cal: 29 of 32 goals reached in time, 6 infractions in 8 km; own:")
+    assert first.startswith("cal: 29 of 32 goals reached in time, 6 infractions of its own fault in 8 km; own:")
     assert first.endswith("(see Problems).")
 
 

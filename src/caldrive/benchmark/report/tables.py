@@ -27,6 +27,7 @@ from caldrive.benchmark.report.infraction_tables import (
 from caldrive.benchmark.report.runs import BenchmarkRun, Table, cells_by_place, conditions, suites
 from caldrive.benchmark.suites import TrialResult
 
+SUBJECT, ALL = "cal", "all"  # whose comparison with each other agent is asked for; every condition or task
 STATIC = "navigation"  # the task whose comfort the paper gives
 COMFORT_HEADS = {
     "center_distance": "centre distance, median m",
@@ -60,7 +61,7 @@ def headline(runs: Sequence[BenchmarkRun]) -> str:
         km = sum(result.episode.distance for result in run.results) / 1000
         faults = sum(infraction.at_fault for result in run.results for infraction in result.episode.infractions)
         said = f"{run.name}: {reached} of {len(run.results)} goals reached in time, "
-        said += f"{counted(faults, 'infraction')} in {km:.0f} km"
+        said += f"{counted(faults, 'infraction')} of its own fault in {km:.0f} km"
         sentences.append(f"{said} (see Problems)" if run.problems else said)
     return "; ".join(sentences) + "."
 
@@ -117,25 +118,26 @@ def _cell_texts(cell: Cell | None) -> tuple[str, str, str, str]:
 
 
 def _paired(runs: Sequence[BenchmarkRun]) -> Table:
-    """The first run beside each of the others, on the episodes that both drove."""
+    """CAL, or without it the first run, beside each of the others, on the episodes that both drove."""
+    first = next((run for run in runs if run.name == SUBJECT), runs[0])
+    places = [(ALL, ALL), *dict.fromkeys(key[1:] for key in cells_by_place(runs))]
     rows = []
-    for other in runs[1:]:
-        for condition, task in dict.fromkeys(key[1:] for key in cells_by_place(runs)):
-            pair = paired(_in_cell(runs[0], condition, task), _in_cell(other, condition, task))
+    for other in runs:
+        for condition, task in places if other is not first else ():
+            pair = paired(_in_cell(first, condition, task), _in_cell(other, condition, task))
             if pair.episodes:
                 counts = (pair.both, pair.first_alone, pair.second_alone, pair.neither)
                 rows.append((condition, task, other.name, *map(str, counts), f"{pair.p_value:.2g}"))
-    first = runs[0].name
     text = (
-        f"Goals that {first} and another agent reached in time in the same episodes, and McNemar's exact test: how "
-        "likely a difference as large would be if both were as good."
+        f"Goals that {first.name} and another agent reached in time in the same episodes, and McNemar's exact test: "
+        "how likely a difference as large would be if both were as good."
     )
-    head = ("condition", "task", "other", "both", f"{first} alone", "other alone", "neither", "p")
+    head = ("condition", "task", "other", "both", f"{first.name} alone", "other alone", "neither", "p")
     return Table(title="Paired comparison", text=text, head=head, rows=tuple(rows))
 
 
 def _in_cell(run: BenchmarkRun, condition: str, task: str) -> list[TrialResult]:
-    return of_tasks(run.of_condition(condition), task)
+    return list(run.results) if condition == ALL else of_tasks(run.of_condition(condition), task)
 
 
 def _comfort(runs: Sequence[BenchmarkRun]) -> Table:
