@@ -47,7 +47,7 @@ newest:
 	rm -rf out/newest
 	$(PYTHON) -m venv out/newest
 	out/newest/bin/pip install --quiet --disable-pip-version-check "$$(grep '^torch==' constraints.txt)"
-	out/newest/bin/pip install --quiet --disable-pip-version-check '.[explain,hdf5,search,tune]'
+	out/newest/bin/pip install --quiet --disable-pip-version-check '.[explain,gym,hdf5,search,tune]'
 	out/newest/bin/pip freeze
 	out/newest/bin/python scripts/every_verb.py
 
@@ -68,8 +68,9 @@ model: $(READY)
 	step benchmark --suite quick --model $(MODEL)/training/model.safetensors --out $(MODEL)/quick; \
 	echo "$$(date +%FT%T) done: $(MODEL)/training/model.safetensors" | tee -a $(MODEL)/log.txt
 
-# The paper's other three systems from the recording that `make model` makes; a run that was stopped goes on.
+# The paper's other three systems from the recording that `make model` makes, too; a run that was stopped goes on.
 baselines: $(READY)
+	$(BIN)/caldrive collect --out $(MODEL)/recording --semantic
 	$(BIN)/caldrive baselines --data $(MODEL)/recording --out out/baselines $(ARGS)
 
 # All suites with all drivers, and in docs/results the report's tables and every episode's line (compressed), from which

@@ -41,6 +41,7 @@ COMMANDS = {
     "town": "--town town02 --plan plan.png",
     "speed world": "--town town02 --steps 3",
     "speed agent": "--steps 3",
+    "speed env": "--steps 3 --observation affordances --task straight",
     "determinism": "--agent oracle --town town02 --seconds 1",
 }
 # Trainings like those of the verb train, what ends when it is stopped, and what needs a CARLA.

@@ -1,18 +1,21 @@
 """Prints the tables of README.md and docs/results.md, from the lines that are kept in docs/results.
 
-python -m scripts.result_tables [unseen unseen-wide paper nocrash blind] [--results docs/results]
+python -m scripts.result_tables [unseen paper ...] [--results docs/results]
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from statistics import fmean
 
 from caldrive.benchmark.metrics import Cell, cells, red_light_counts, speeding, touch_rates, wilson
 from caldrive.benchmark.published import SYSTEMS, success
 from caldrive.benchmark.report.runs import BenchmarkRun, load_run, suites
+from caldrive.benchmark.report.tables import STATIC, tables
 from caldrive.benchmark.suites import CONDITIONS, DENSITIES, TrialResult
 from caldrive.driving.tasks import TASKS
 from caldrive.results import InfractionKind
@@ -113,10 +116,59 @@ def _blind_row(results: Sequence[TrialResult]) -> Iterator[str]:
     yield f"{100 * share:.1f}" + (f", at most by {worst:.0f} km/h" if worst else "")
 
 
+def infractions(folder: Path) -> Rows:
+    """The paper's table 2, which is of its last task: kilometres between two infractions, and how many."""
+    yield from _of_report(folder, "Infractions", lambda row: row[1] == TASKS[-1])
+
+
+def behaviour(folder: Path) -> Rows:
+    """The supplement's driving behaviour: over static navigation, all conditions pooled."""
+    yield from _of_report(folder, "Driving behaviour", lambda row: row[1].startswith(STATIC))
+
+
+def _of_report(folder: Path, title: str, wanted: Callable[[Sequence[str]], bool]) -> Rows:
+    """Some rows of a table of the report, without the column that is the same in all of them."""
+    table = next(table for table in tables(list(runs_of(folder).values())) if table.title == title)
+    for row in (table.head, *filter(wanted, table.rows)):
+        yield [row[0], *row[2:]]
+
+
+def seeds(folder: Path) -> Rows:
+    """Success of the systems that learn from chance: mean and range over their seeds in each condition; and the seed in
+    the middle by town01's conditions, which ships."""
+    runs, conditions = runs_of(folder), dict[str, None]()
+    groups = dict[str, list[str]]()
+    for name, run in runs.items():
+        conditions |= dict.fromkeys(result.trial.condition for result in run.results)
+        if (seed := re.fullmatch(r"(.+)-\d+(-by-the-truth)?", name)) is not None:
+            groups.setdefault(f"{seed[1]}{seed[2] or ''}", []).append(name)
+    yield "system", "seeds", *conditions, "in the middle"
+    for system, names in groups.items():
+        shares = [[_percent(runs[name].of_condition(condition)) for name in names] for condition in conditions]
+        known = sorted(names, key=lambda name: _percent(_in_town01(runs[name].results)))
+        yield system, str(len(names)), *map(_mean_and_range, shares), known[(len(known) - 1) // 2]
+
+
+def _in_town01(results: Sequence[TrialResult]) -> list[TrialResult]:
+    """Those that may choose among networks."""
+    return [result for result in results if result.trial.scenario.town == "town01"]
+
+
+def _percent(results: Sequence[TrialResult]) -> float:
+    return 100 * sum(cell.successes for cell in cells(results)) / max(1, len(results))
+
+
+def _mean_and_range(percents: Sequence[float]) -> str:
+    return f"{fmean(percents):.0f} ({min(percents):.0f}-{max(percents):.0f})"
+
+
 TABLES: dict[str, tuple[str, Callable[[Path], Rows]]] = {  # by name: the suite, and what makes the table
     "unseen": ("unseen", unseen),
     "unseen-wide": ("unseen-wide", unseen),
     "paper": ("corl2017", paper),
+    "infractions": ("corl2017", infractions),
+    "behaviour": ("corl2017", behaviour),
+    "seeds": ("corl2017-once", seeds),
     "nocrash": ("nocrash", nocrash),
     "traffic-school": ("traffic-school", nocrash),
     "blind": ("dynamic", blind),

@@ -140,6 +140,7 @@ def test_settings_may_change_at_reset_but_the_spaces_may_not(road: DrivingEnv) -
         ({"tasks": ("swim",)}, "wanted one of straight"),
         ({"towns": ()}, "give some"),
         ({"render_mode": "human"}, "wanted rgb_array"),
+        ({"towns": ("town02",)}, "found town02 to learn from, wanted another"),
     ],
 )
 def test_a_setting_that_cannot_be_is_said_in_one_sentence(settings: dict[str, Any], said: str) -> None:

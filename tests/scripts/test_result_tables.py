@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import gzip
+import re
+import shutil
 from pathlib import Path
 
 import pytest
 
 from caldrive.benchmark.report.runs import load_run
 from caldrive.results import InfractionKind
-from scripts.result_tables import RESULTS, TABLES, markdown, unseen
+from scripts.result_tables import RESULTS, TABLES, markdown, seeds, unseen
 
 FOLDER = RESULTS / "unseen"
 
@@ -44,3 +46,14 @@ def test_a_run_that_lacks_a_task_leaves_its_cell_empty(tmp_path: Path) -> None:
     head, whole, half = unseen(tmp_path)
     assert len(head) == len(whole) == len(half)
     assert half[2] == ""
+
+
+def test_seeds_stand_together_with_mean_range_and_the_one_in_the_middle(tmp_path: Path) -> None:
+    for name, kept in (("cil-0", "oracle"), ("cil-1", "cal"), ("cil-2", "oracle"), ("cal", "cal")):
+        shutil.copytree(RESULTS / "corl2017" / kept, tmp_path / name)
+    head, *rows = seeds(tmp_path)
+    assert head[2] == "training"
+    assert [row[:2] for row in rows] == [("cil", "3")]
+    mean, low, high = map(int, re.findall(r"\d+", rows[0][head.index("new town")]))
+    assert low <= mean <= high
+    assert rows[0][-1] in ("cil-0", "cil-1", "cil-2")

@@ -23,7 +23,7 @@ from caldrive.commands.explain import Blame, ExplainCounterfactuals, ExplainDriv
 from caldrive.commands.search import Search
 from caldrive.commands.see import See
 from caldrive.commands.serve_carla import ServeCarla
-from caldrive.commands.speed import AgentSpeed, WorldSpeed
+from caldrive.commands.speed import AgentSpeed, EnvSpeed, WorldSpeed
 from caldrive.commands.town import Town
 from caldrive.commands.train import Evaluate, Train
 from caldrive.commands.tune import Tune
@@ -63,11 +63,12 @@ VERBS: Mapping[str, Verb] = {
     "town": Verb(Town, "Draw a town on one page, or its plan."),
     "speed world": Verb(WorldSpeed, "Camera steps a second, and where the time goes."),
     "speed agent": Verb(AgentSpeed, "Milliseconds from image to control."),
+    "speed env": Verb(EnvSpeed, "Steps a second of the gymnasium environment."),
     "determinism": Verb(Determinism, "Drive the same episode twice and compare all bytes."),
 }
 GROUPS = {
     "explain": "Show where the network looks.",
-    "speed": "Measure how fast the world or the agent is.",
+    "speed": "Measure how fast the world, the agent or the gymnasium environment is.",
 }  # first words of verbs of two words
 
 

@@ -6,8 +6,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from caldrive.checks import require_modules
 from caldrive.commands.answer import Answer, Output
-from caldrive.driving.settings import AgentSpeedSettings, WorldSpeedSettings
+from caldrive.driving.settings import AgentSpeedSettings, EnvSpeedSettings, WorldSpeedSettings
 from caldrive.files import read_json
 from caldrive.progress import Progress
 
@@ -64,6 +65,20 @@ class AgentSpeed(AgentSpeedSettings, Compared):
             values["ratios"] = {"median": before.median_ms / speed.median_ms}
             said += f"; {before.median_ms / speed.median_ms:.2f} times as fast as before"
         return Answer(values, said)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvSpeed(EnvSpeedSettings, Output):
+    """Steps a second of the gymnasium environment in town01, resets included."""
+
+    def run(self, progress: Progress) -> Answer:
+        """Measures; answers with the steps a second of all environments together."""
+        require_modules("gym", "gymnasium")
+        from caldrive.gym.speed import measure_env
+
+        speed = measure_env(self, progress)
+        several = f" of {speed.environments} environments together" if speed.environments > 1 else ""
+        return Answer(asdict(speed), f"{speed.steps_per_second:.0f} steps a second{several} ({speed.processor})")
 
 
 def earlier(path: Path, kind: type[Timing]) -> Timing:

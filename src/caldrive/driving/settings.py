@@ -126,6 +126,22 @@ class AgentSpeedSettings(AgentSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class EnvSpeedSettings:
+    """Steps a second of the gymnasium environment in town01, resets included."""
+
+    observation: Literal["image", "affordances"] = "image"
+    """What is seen: an image of 200 x 88, or the true affordances, for which nothing is drawn."""
+    task: str = "navigation-dynamic"
+    """straight, one-turn, navigation or navigation-dynamic (20 cars and 50 people)."""
+    environments: int = 1
+    """How many at the same time, each in a process of its own where there are several."""
+    steps: int = 1000
+    """How many steps to measure, in each of them."""
+    seed: int = 0
+    """Decides everything random."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class PictureSettings:
     """A person's own video or pictures, and the network that looks at them."""
 

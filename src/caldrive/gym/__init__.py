@@ -22,7 +22,7 @@ __all__ = ["ENVIRONMENTS", "DrivingEnv", "EnvConfig", "make_env", "make_vec", "r
 
 ENVIRONMENTS = {  # by id: the settings
     "caldrive/Town01-v0": EnvConfig(),
-    "caldrive/Town02-v0": EnvConfig(towns=("town02",), weathers=tuple(range(1, 15))),
+    "caldrive/Town02-v0": EnvConfig(towns=("town02",), weathers=tuple(range(1, 15)), held_out=True),
     "caldrive/Town01Traffic-v0": EnvConfig(tasks=("navigation-dynamic",)),
     "caldrive/Town01Affordances-v0": EnvConfig(observation="affordances"),
     "caldrive/Town01Carla2017-v0": EnvConfig(

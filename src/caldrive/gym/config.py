@@ -12,7 +12,7 @@ from caldrive.driving.rules import COLLISION, RULES
 from caldrive.driving.tasks import TASKS, TIME_LIMITS
 from caldrive.gym.rewards import PRESETS
 from caldrive.results import InfractionKind
-from caldrive.scenarios import require_not_held_out
+from caldrive.scenarios import require_to_learn_from
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,12 @@ class EnvConfig:
     """What counts as an infraction: strict, corl2017 or nocrash."""
 
     held_out: bool = False
-    """Whether it may have towns that only judge (generated ones from seed 9,000,000 on): to measure, not to learn."""
+    """Whether it may have towns that only judge (town02, and generated ones from seed 9,000,000 on): to measure, not to
+    learn."""
 
     def __post_init__(self) -> None:
         for town in () if self.held_out else self.towns:
-            require_not_held_out(town)
+            require_to_learn_from(town)
         require_one_of("reward", self.reward, PRESETS)
         require_one_of("rules", self.rules, RULES)
         require_one_of("time_limit", self.time_limit, TIME_LIMITS)
