@@ -13,24 +13,23 @@ from pathlib import Path
 from caldrive.benchmark.report.page import FAILURE_HEAD, report_text
 from caldrive.benchmark.report.runs import load_runs
 from caldrive.files import write_whole
+from scripts import drive_results
 
 RESULTS = Path(__file__).parents[1] / "docs" / "results"
-SUITES = ("corl2017",)
-CAUSES, FAILURES = "## How missed goals began\n", "## Failures\n"
+SUITES = tuple(sorted(path.parent.name for path in RESULTS.glob("*/report.md")))
+CAUSES, FAILURES = "## Failure causes\n", "## Failures\n"
 CAUSE = FAILURE_HEAD.index("how it began")
 
 
 def report_again(folder: Path) -> str:
-    """The report on a suite's kept lines, with the causes that the kept report holds. Raises ValueError where that one
-    holds none."""
-    before, _, kept = (folder / "report.md").read_text().partition(CAUSES)
-    causes, found, kept_failures = kept.partition(FAILURES)
-    if not (before and found):
-        raise ValueError(f"found no causes in {folder / 'report.md'}, wanted those of the traces: take it from git")
-    tables, _, failures = report_text(load_runs((folder / "oracle", folder / "cal"))).partition(FAILURES)
+    """The report on a suite's kept lines, with the causes that the kept report holds."""
+    before, found, kept_failures = (folder / "report.md").read_text().partition(FAILURES)
+    _, *causes = before.partition(CAUSES)
+    drivers = [folder / name for name in drive_results.SUITES[folder.name] if (folder / name).exists()]
+    tables, _, failures = report_text(load_runs(drivers)).partition(FAILURES)
     known = {tuple(cells[:2]): cells[CAUSE] for cells in map(_cells, kept_failures.splitlines()) if len(cells) > CAUSE}
     rows = [_with_cause(row, known) for row in failures.splitlines(keepends=True)]
-    return "".join([tables, CAUSES, causes, FAILURES, *rows])
+    return "".join([tables, *causes, found, *rows])
 
 
 def _cells(row: str) -> list[str]:
