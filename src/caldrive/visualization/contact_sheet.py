@@ -25,6 +25,7 @@ from caldrive.world.scene.weather import WEATHERS
 from caldrive.world.town import load_town
 
 FEWEST_COLUMNS = 3  # wide enough for the town below
+RECORDED = (1, 3, 6, 8)  # weathers in which random looks are recorded
 MARGIN, CAPTION = 6, 18  # pixels between images, and of height of the line above each
 BACKGROUND, TEXT = (24, 25, 27), (226, 226, 222)
 BEFORE_LIGHT = 13.0  # m from the viewpoint to the stop line
@@ -73,10 +74,10 @@ def contact_sheet(
     image: (width, height).
 
     randomised: where it is not 0, the number of random looks of the town to show instead, one in each row, in the
-    weathers in turn. Raises ValueError or FileNotFoundError as `load_roads` does.
+    weathers of a recording in turn. Raises ValueError or FileNotFoundError as `load_roads` does.
     """
     roads = load_roads(town)
-    rows = [(look, weathers[(look - 1) % len(weathers)]) for look in range(1, randomised + 1)]
+    rows = [(look, RECORDED[(look - 1) % len(RECORDED)]) for look in range(1, randomised + 1)]
     rows = rows or [(0, weather) for weather in weathers]
     cell = (size[0] + MARGIN, size[1] + CAPTION + MARGIN)
     columns = max(len(viewpoints(roads)), FEWEST_COLUMNS)
