@@ -47,7 +47,8 @@ class AttentionSettings:
     """What attention is drawn of."""
 
     affordance: UseAppendAction[tuple[str, ...]] = ()
-    """An affordance to draw the attention of; may be given again. Without it hazard_stop and red_light."""
+    """An affordance to draw the attention of, or one of its classes, such as speed_sign=60; may be given again. Without
+    it hazard_stop and red_light."""
     method: Literal["hirescam", "gradcam"] = "hirescam"
     """hirescam: what counted at each place, of 8 x 8 pixels; gradcam: as in the paper, of 16 x 16."""
 
@@ -74,14 +75,19 @@ class ExplainDrive(AttentionSettings, EpisodeSettings, Configurable):
 
 @dataclass(frozen=True, kw_only=True)
 class ExplainPictures(AttentionSettings, PictureSettings, Output):
-    """Film where the network looks in your own video or pictures."""
+    """Film where the network looks in your own video or pictures, or draw it in one."""
 
     out: Path = Path("out/attention.mp4")
-    """The video."""
+    """The video; or a .png file, a still of the last picture, beside it as it is."""
 
     def run(self, progress: Progress) -> Answer:
-        """Looks at the pictures; answers with the video."""
+        """Looks at the pictures; answers with the video or the still."""
+        from caldrive.explain.attention_still import ENDING, draw_still
         from caldrive.explain.attention_video import see_attention
+
+        if self.out.suffix.lower() == ENDING:
+            draw_still(self, self.affordances, self.method)
+            return Answer({"still": str(self.out)}, f"attention in the last picture: {self.out}")
 
         frames = see_attention(self, self.affordances, self.method, progress)
         return Answer({"video": str(self.out), "frames": frames}, f"attention in {frames} pictures: {self.out}")
