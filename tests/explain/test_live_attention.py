@@ -21,7 +21,7 @@ from caldrive import CameraConfig, Control
 class Own:
     camera = CameraConfig(width=320, height=144)
 
-    def reset(self, scenario):
+    def reset(self):
         pass
 
     def act(self, observation):

@@ -38,6 +38,7 @@ class Blame(Output):
         found, run = blame(self.folder, self.out or self.folder / FOLDER, self.workers, self.ray, progress)
         values = asdict(found) | {
             "episodes": len(run.results), "rest": found.rest, "blame": {key: found.of(key) for key in found.failures},
+            "shares": found.shares(),
         }  # fmt: skip
         return Answer(values, blame_table(found, run.name, len(run.results)))
 

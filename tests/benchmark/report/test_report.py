@@ -104,7 +104,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[BenchmarkRun]:
     moments = tuple(
         FailureMoment(title, "red light: seen 3 %, true yes", jpeg, jpeg) for title in ("1 s before", "red light")
     )
-    why = Explanation("red light: its truth rescues it", ("red light",), ("red light",), moments)
+    why = Explanation("red light: its truth rescues it", "red light", ("red light",), ("red light",), moments)
     return [both[0], replace(both[1], explanations={both[1].results[9].trial.key: why})]
 
 
@@ -258,12 +258,26 @@ def test_a_failure_whose_pictures_are_too_large_leaves_its_place_to_the_next(tmp
 
 def test_blame_is_counted_and_stands_beside_each_failure(runs: list[BenchmarkRun]) -> None:
     table = next(table for table in tables(runs) if table.title == "Blame")
-    assert [row for row in table.rows if row[3] != "0"] == [("cal", "red light", "1 of 1", "1")]
+    assert [row for row in table.rows if row[3] != "0"] == [("cal", "red light", "1 of 1", "1", "1")]
     assert len(table.rows) == len(BY_NAME)  # of the run of which nobody knows, none
     assert "| to blame |" in report_text(runs)
     assert "| red light: its truth rescues it |" in report_text(runs)
     assert "Blame" not in [table.title for table in tables(runs[:1])]
     assert "to blame" not in report_text(runs[:1])
+
+
+def test_each_failure_is_in_one_row_of_the_table_of_blame(tmp_path: Path) -> None:
+    either, both = (
+        Explanation("?", "one of several", ("red light", "hazard stop")),
+        Explanation("?", "world", ("world",)),
+    )
+    sound = run("cal", tmp_path)
+    keys = [failure.result.trial.key for failure in sound.failures]
+    explained = replace(sound, explanations=dict(zip(keys, [either, both, both], strict=False)))
+    table = next(table for table in tables([explained]) if table.title == "Blame")
+    counts = {row[1]: row[2:] for row in table.rows if row[2] != "0 of 3"}
+    assert counts == {"one of several": ("1 of 3", "", ""), "world": ("2 of 3", "", "")}
+    assert [row[3] for row in table.rows if row[1] in either.blamed] == ["1", "1"]
 
 
 @pytest.mark.parametrize("size", [9_000, 30_000])
