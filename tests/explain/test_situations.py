@@ -11,6 +11,8 @@ import torch
 from PIL import Image as Picture
 
 from caldrive.datatypes import Affordances, Command, Semantic
+from caldrive.explain import recorded
+from caldrive.explain.activation_maps import Map
 from caldrive.explain.overlay import BAR, LABEL
 from caldrive.explain.recorded import contact_sheet, figures
 from caldrive.explain.situations import SITUATIONS, find_examples
@@ -104,3 +106,19 @@ def test_the_figures_are_shares_and_the_same_for_a_seed(folder: Path, network: N
         assert 0 <= curve.insertion <= 1
     assert len(one.cascade) == 6
     assert abs(one.cascade[-1]) < 0.9
+
+
+def test_each_example_has_a_random_map_of_its_own_of_the_resolution_of_its_attention(
+    folder: Path, network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Map] = []
+
+    def random_map(like: Map, size: tuple[int, int], rng: np.random.Generator) -> Map:
+        drawn.append(rng.random(like.shape).astype(np.float32))
+        return np.zeros(size, np.float32)
+
+    monkeypatch.setattr(recorded, "random_map", random_map)
+    found = find_examples(folder, n=2, history=4, seed=0)["straight"]
+    figures(network, {"straight": found})
+    assert [one.shape for one in drawn] == [(11, 25)] * 2 * 4  # of two examples, each of four frames
+    assert len({one.tobytes() for one in drawn}) == len(drawn)

@@ -127,7 +127,8 @@ def _where(example: Example, attention: Attention) -> tuple[float, float, float]
 
 def _curves(network: Network, example: Example, attention: Attention, seed: int) -> tuple[Curve, Curve, Curve]:
     """Of the attention, of random maps and of one of the middle, in all frames that the block looks at."""
-    size, rng = example.images[-1].shape[:2], np.random.default_rng(seed)
+    size = example.images[-1].shape[:2]
+    rng = np.random.default_rng((seed, *example.source.encode()))  # the same maps for all would be a single control
     images = frames_at(example.images, attention.back)
     score = score_of(network, example.question, example.images)
 
@@ -139,7 +140,7 @@ def _curves(network: Network, example: Example, attention: Attention, seed: int)
 
     maps: list[list[Map]] = [
         [upsampled(one, size) for one in attention.maps],
-        [random_map(size, rng) for _ in images],
+        [random_map(one, size, rng) for one in attention.maps],
         [centred_map(size)] * len(images),
     ]
     first, second, third = (curve(images, one, on_history) for one in maps)
