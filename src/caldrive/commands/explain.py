@@ -179,6 +179,7 @@ class ExplainCounterfactuals(Output):
         from caldrive.explain.counterfactual_episode import StudyConfig
         from caldrive.explain.counterfactual_study import study
         from caldrive.perception.network.checkpoint import read_info
+        from caldrive.provenance import code_version
 
         require_within("--cases", self.cases, 1, 1000, 40)
         require_captum()  # before the drive, not after it
@@ -187,7 +188,8 @@ class ExplainCounterfactuals(Output):
         config = StudyConfig(path, tuple(self.scenarios()), self.cases, self.method, self.seed)
         found = study(config, self.out, self.workers, progress)
         values = {
-            "sheet": str(found.sheet), "found": found.found, "effects": [asdict(one) for one in found.effects],
+            "code": code_version(), "sheet": str(found.sheet), "found": found.found,
+            "effects": [asdict(one) for one in found.effects],
             "observations": [asdict(one) | {"verdict": one.verdict} for one in found.findings],
             "at_the_wheel": asdict(found.gap),
         }  # fmt: skip

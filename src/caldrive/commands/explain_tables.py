@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from caldrive.affordances import SPECS
+from caldrive.provenance import code_version
 
 if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.explain.blame import Blame
@@ -67,7 +68,7 @@ def study_table(study: Study) -> Group:
         f"left out, as the network saw them wrong: {', '.join(missed) or 'none'}",
         f"at the wheel, in 8-bit integers, {gap.other_answers} of {gap.cases} answers are other ones; probabilities "
         f"differ by {gap.difference:.3f} on average",
-        f"sheet: {study.sheet}",
+        f"driven by {code_version()}; sheet: {study.sheet}",
     ]
     return Group(_effect_table(study.effects), _finding_table(study.findings), *map(Text, notes))
 

@@ -12,9 +12,10 @@ from typing import IO
 
 import numpy as np
 
+from caldrive.agents.registry import agent_entry
 from caldrive.agents.rows import model_path
 from caldrive.checks import require_within, require_writable_file
-from caldrive.datatypes import Affordances, Command, Image
+from caldrive.datatypes import Affordances, CameraConfig, Command, Image
 from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.pictures import open_source
 from caldrive.driving.referee import Referee
@@ -63,6 +64,7 @@ def drive_attention(
     package's); returns its number of frames. Raises ValueError for settings that cannot be."""
     questions = _checked(affordances, out)
     network, _ = load_network(model_path(settings.model if settings.agent == "cal" else None))
+    require_camera(agent_entry(settings.agent).camera(settings) or CameraConfig(), network)
     scenes = _driven(settings)
     return _write(network, scenes, questions, method, out, 10.0, progress)
 
@@ -83,6 +85,16 @@ def _checked(affordances: Sequence[str], out: Path) -> list[Question]:
     """The questions, without a command. Raises ValueError where one, or the video's name, cannot be."""
     require_writable_file(out, "--out", ".mp4")
     return [Question.parse(text) for text in affordances]
+
+
+def require_camera(camera: CameraConfig, network: Network) -> None:
+    """Raises ValueError where an agent's camera does not give what a network takes."""
+    height, width = network.config.image_size
+    if (camera.width, camera.height) != (width, height):
+        raise ValueError(
+            f"found an agent whose camera gives {camera.width} x {camera.height}, wanted {width} x {height} as the "
+            "network takes them that is asked where it looks: take another --agent, or do without attention"
+        )
 
 
 def _driven(settings: EpisodeSettings) -> Iterator[Scene]:

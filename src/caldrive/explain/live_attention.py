@@ -9,7 +9,7 @@ from pathlib import Path
 from caldrive.agents.rows import model_path
 from caldrive.datatypes import CameraConfig, Image, Observation
 from caldrive.explain.activation_maps import Question, attend
-from caldrive.explain.attention_video import PANEL_WIDTH
+from caldrive.explain.attention_video import PANEL_WIDTH, require_camera
 from caldrive.explain.overlay import explained, scale_of
 from caldrive.perception.network.checkpoint import load_network
 
@@ -27,7 +27,7 @@ class LiveAttention:
     ) -> None:
         self.question, self.method = Question.parse(affordance), method
         self.network, _ = load_network(model_path(model))
-        _require_size(camera, self.network.config.image_size)
+        require_camera(camera, self.network)
         self._history: deque[Image] = deque(maxlen=self.network.span)
         self._scale, self._time = 0.0, 0.0
 
@@ -43,12 +43,3 @@ class LiveAttention:
         attention = attend(self.network, question, list(self._history), self.method)
         self._scale = max(self._scale, scale_of([attention.now]))
         return explained(observation.image, attention, self._scale, width=PANEL_WIDTH)
-
-
-def _require_size(camera: CameraConfig, size: tuple[int, int]) -> None:
-    """Raises ValueError where a camera's images are not of a network's size (height, width)."""
-    if (camera.height, camera.width) != size:
-        raise ValueError(
-            f"found an agent whose camera gives {camera.width} x {camera.height}, wanted {size[1]} x {size[0]} as the "
-            "network of caldrive explain takes them: leave --attention out"
-        )
