@@ -29,9 +29,9 @@ def test_a_search_answers_with_the_best_blocks_and_its_report(
 
 
 def test_every_setting_is_an_option_and_may_come_from_a_file(tmp_path: Path) -> None:
-    (tmp_path / "search.toml").write_text('trials = 60\nsampler = "tpe"\ntasks = ["red_light"]\n')
+    (tmp_path / "search.toml").write_text('trials = 60\nsampler = "tpe"\ntasks = ["relative_angle"]\n')
     search = parse(["search", "--config", str(tmp_path / "search.toml"), "--trials", "7", "--conditioning"])
-    assert search.search == SearchConfig(trials=7, sampler="tpe", tasks=("red_light",), conditioning=True)
+    assert search.search == SearchConfig(trials=7, sampler="tpe", tasks=("relative_angle",), conditioning=True)
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,7 @@ def test_every_setting_is_an_option_and_may_come_from_a_file(tmp_path: Path) -> 
         (("--trials", "0"), "found --trials 0, wanted 1 to 100000"),
         (("--tasks", "wings"), "found --tasks wings, wanted one of hazard_stop"),
         (("--sampler", "grid"), "found --sampler grid, wanted one of random, tpe"),
+        (("--tasks", "red_light", "--conditioning"), "found --conditioning with --tasks red_light, whose blocks"),
         (("--data", "gone"), "there is no episode"),
         (("--model", "gone.safetensors"), "found no file"),
         (("--workers", "0"), "found --workers 0"),

@@ -108,6 +108,31 @@ def test_questions_that_cannot_be_end_in_a_sentence(question: tuple[str, int | N
         Question(question[0], label=question[1])
 
 
+def test_a_question_is_typed_with_its_class() -> None:
+    assert Question.parse("speed_sign=60") == Question("speed_sign", label=60)
+    assert Question.parse("red_light=0") == Question("red_light", label=0)
+    assert Question.parse("relative_angle") == Question("relative_angle")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("speed_sign=", "found class  of speed sign, wanted"),
+        ("speed_sign=fast", r"found class fast of .*\(0, 30, 60, 90\): type speed_sign=90"),
+        ("relative_angle=1", r"\(none, as it is a number\): type relative_angle"),
+        ("lights=1", "found affordance 'lights', wanted one of hazard_stop"),
+    ],
+)
+def test_a_class_that_is_none_ends_in_a_sentence(text: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        Question.parse(text)
+
+
+def test_the_class_that_is_asked_for_is_named_with_the_map(network: Network) -> None:
+    for label, said in ((0, "no speed sign"), (60, "speed sign 60"), (90, "speed sign 90")):
+        assert attend(network, Question("speed_sign", label=label), pictures(1)).reply.label == said
+
+
 @pytest.mark.parametrize("method", activation_maps.METHODS)
 def test_what_speaks_for_a_class_speaks_against_the_other(network: Network, method: str) -> None:
     for_red, for_none = (

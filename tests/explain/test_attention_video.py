@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,10 +12,11 @@ import pytest
 import torch
 from PIL import Image as Picture
 
-from caldrive.datatypes import Command, Observation
+from caldrive.datatypes import Affordances, Command, Image
 from caldrive.explain.activation_maps import Question
-from caldrive.explain.attention_video import PANEL_WIDTH, LiveAttention, Scene, look, panels
+from caldrive.explain.attention_video import PANEL_WIDTH, Scene, _write, grid, look, panels
 from caldrive.perception.network.network import Network
+from caldrive.progress import silent
 from tests.command_line import run_json
 from tests.explain.test_activation_maps import CONFIG, pictures
 
@@ -37,6 +39,46 @@ def test_each_scene_has_the_ones_before_it_as_its_history() -> None:
     alone = next(look(network, iter([Scene(images[3], Command.LEFT, 0.5)]), [Question("hazard_stop")], "hirescam"))
     assert (looked[3].attentions[0].now != alone.attentions[0].now).any()
     assert panels(looked[0], (1.0, 1.0)).shape[1] == 2 * PANEL_WIDTH
+
+
+def test_what_is_true_stands_beside_what_the_network_says() -> None:
+    torch.manual_seed(1)
+    network, (image,) = Network(CONFIG).eval(), pictures(1)
+    questions = [Question("red_light"), Question("speed_sign"), Question("vehicle_distance")]
+    truth = Affordances(red_light=1.0, speed_sign=None, vehicle_distance=7.0)
+    (known,) = look(network, [Scene(image, Command.LEFT, 0.5, truth)], questions, "hirescam")
+    (unknown,) = look(network, [Scene(image, Command.LEFT, 0.5)], questions, "hirescam")
+    assert known.truths == ("yes", "none", "7.00")
+    assert unknown.truths == ("", "", "")
+    assert (panels(known, (1.0,) * 3) != panels(unknown, (1.0,) * 3)).any()
+
+
+def test_a_long_video_is_not_kept_in_memory(tmp_path: Path) -> None:
+    torch.manual_seed(1)
+    network, alive, most = Network(CONFIG).eval(), list[weakref.ref[Image]](), 0
+
+    def scenes() -> Iterator[Scene]:
+        nonlocal most
+        for image in pictures(12):
+            image = image.copy()
+            alive.append(weakref.ref(image))
+            most = max(most, sum(one() is not None for one in alive))
+            yield Scene(image, Command.LEFT, 0.5)
+
+    out = tmp_path / "attention.mp4"
+    assert _write(network, scenes(), [Question("hazard_stop")], "hirescam", out, 10.0, silent) == 12
+    assert most <= network.span + 2
+    assert len(frames_of(out)) == 12
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_pictures_of_different_heights_stand_beside_each_other() -> None:
+    low, high = (np.full((height, 10, 3), height, np.uint8) for height in (4, 6))
+    page = grid([low, high, low])
+    assert page.shape == (10, 20, 3)
+    assert (page[:4, :10] == 4).all()
+    assert (page[4:6, :10] != 4).all()
+    assert (page[:6, 10:] == 6).all()
 
 
 def test_a_drive_is_filmed(tmp_path: Path) -> None:
@@ -66,33 +108,14 @@ def test_rows_that_a_picture_does_not_have_are_named(tmp_path: Path) -> None:
     assert "found --crop 88:400 where low.png has 88 rows" in refused["error"]
 
 
-def test_attention_is_drawn_while_a_car_drives(monkeypatch: pytest.MonkeyPatch) -> None:
-    torch.manual_seed(1)
-    network = Network(CONFIG).eval()
-    monkeypatch.setattr("caldrive.explain.attention_video.load_network", lambda path: (network, None))
-    live, images = LiveAttention("relative_angle"), pictures(2)
-
-    def at(time: float, image: np.ndarray, command: Command = Command.LEFT) -> Observation:
-        return Observation(time, image, 5.0, command)
-
-    left = live(at(0.0, images[0]))
-    assert left is not None
-    assert left.shape[1] == PANEL_WIDTH
-    assert live(at(0.1, images[1][:40])) is None
-    right = LiveAttention("relative_angle")(at(0.0, images[0], Command.RIGHT))
-    assert right is not None
-    assert (left != right).any()
-
-
-def test_a_drive_that_nobody_records_draws_no_attention() -> None:
-    refused = run_json("drive", "--agent", "oracle", "--attention", "red_light", "--no-video", code=2)
-    assert "found --attention red_light in a drive that is not recorded" in refused["error"]
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
         (("drive", "--affordance", "lights"), "found affordance 'lights', wanted one of hazard_stop"),
+        (
+            ("drive", "--affordance", "speed_sign=50"),
+            "found class 50 of speed sign, wanted one of its classes (0, 30, 60, 90): type speed_sign=90",
+        ),
         (("drive", "--out", "x.txt"), "wanted a name that ends in .mp4"),
         (("recording", "none"), "there is no episode"),
         (("recording", "none", "--out", "x.jpg"), "wanted a name that ends in .png"),

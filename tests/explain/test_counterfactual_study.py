@@ -25,6 +25,7 @@ from caldrive.files import write_whole
 from caldrive.perception.network.checkpoint import CheckpointInfo, save_network
 from caldrive.perception.network.network import Network
 from caldrive.perception.network.tensor_file import write_tensors
+from caldrive.provenance import code_version
 from caldrive.world.embedded import EmbeddedWorld
 from caldrive.world.rendering.camera import CameraRig
 from tests.command_line import run_json
@@ -110,6 +111,7 @@ def test_the_command_answers_with_effects_and_verdicts(tmp_path: Path, no_sumo_l
     answer = run_json("explain", "counterfactuals", *words.split())
     assert (out / "sheet.png").is_file()
     assert {"found", "effects", "observations", "at_the_wheel"} < answer.keys()
+    assert answer["code"] == code_version()
     assert {one["verdict"] for one in answer["observations"]} == {"too few cases"}
 
 

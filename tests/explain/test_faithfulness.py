@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from caldrive.affordances import BY_NAME
 from caldrive.datatypes import Image, Semantic
@@ -23,6 +25,7 @@ from caldrive.explain.faithfulness import (
     score_of,
     similarity,
 )
+from caldrive.perception.network.config import BlockConfig
 from caldrive.perception.network.network import Network
 from tests.explain.test_activation_maps import CONFIG, pictures
 
@@ -71,10 +74,18 @@ def test_who_looks_at_what_counts_deletes_it_at_once_and_inserts_it_first() -> N
 
     right = curve([image], [box().astype(np.float32)], brightness)
     wrong = curve([image], [1 - box().astype(np.float32)], brightness)
-    unknowing = curve([image], [random_map(SIZE, np.random.default_rng(0))], brightness)
+    unknowing = curve([image], [random_map(np.zeros((11, 25), np.float32), SIZE, np.random.default_rng(0))], brightness)
     assert right.deletion < unknowing.deletion < wrong.deletion
     assert right.insertion > unknowing.insertion > wrong.insertion
     assert right.insertion == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_random_map_has_as_many_places_as_the_one_beside_it() -> None:
+    for places in ((5, 12), (11, 25)):
+        one = random_map(np.zeros(places, np.float32), places, np.random.default_rng(0))
+        assert len(np.unique(one)) == places[0] * places[1]
+    enlarged = random_map(np.zeros((2, 2), np.float32), SIZE, np.random.default_rng(0))
+    assert enlarged.shape == SIZE
 
 
 def test_the_control_that_looks_at_the_middle_does() -> None:
@@ -109,6 +120,21 @@ def test_new_weights_come_from_the_last_layer_on() -> None:
         assert changed == [False] * (5 - stages) + [True] * stages
         outputs = [one.task_blocks()["red_light"].group(0).output.weight for one in (network, other)]
         assert not torch.equal(*outputs)
+
+
+def test_norms_forget_what_they_learnt_with_their_stage_and_their_block() -> None:
+    torch.manual_seed(1)
+    network = Network(replace(CONFIG, batch_norm=True, red_light=BlockConfig("dense", 8, 0.0, norm="batch"))).eval()
+    for layer in network.modules():
+        if isinstance(layer, nn.BatchNorm1d | nn.BatchNorm2d):
+            layer.load_state_dict({name: torch.full_like(value, 7.0) for name, value in layer.state_dict().items()})
+    other = randomised(network, "red_light", 2, seed=5)
+    states = [norm.state_dict() for norm in other.backbone.norms]
+    states += [layer.state_dict() for layer in other.blocks["red_light"].modules() if isinstance(layer, nn.BatchNorm1d)]
+    kept = dict.fromkeys(states[0], 7.0)
+    fresh = {"weight": 1.0, "bias": 0.0, "running_mean": 0.0, "running_var": 1.0, "num_batches_tracked": 0.0}
+    firsts = [{name: float(value.ravel()[0]) for name, value in state.items()} for state in states]
+    assert firsts == [kept] * 3 + [fresh] * 3
 
 
 def test_maps_of_the_same_order_are_alike() -> None:

@@ -5,8 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from caldrive.affordances import BY_NAME
 from caldrive.explain.activation_maps import Attention, Reply
-from caldrive.explain.overlay import BAR, GREEN, LARGER, RED, SMALLER, explained, likely_color, overlay, said, scale_of
+from caldrive.explain.overlay import (
+    BAR,
+    GREEN,
+    LABEL,
+    LARGER,
+    RED,
+    SMALLER,
+    explained,
+    likely_color,
+    overlay,
+    said,
+    scale_of,
+    still,
+    true_text,
+)
 
 IMAGE = np.full((40, 80, 3), 100, np.uint8)
 MAP = np.zeros((4, 8), np.float32)
@@ -55,3 +70,29 @@ def test_a_still_says_what_was_asked_and_how_far_back_the_block_looks() -> None:
     assert (one[160:, 112:] != two[160:, 112:]).any()
     assert said(reply) == "red light: 25 %"
     assert said(Reply("relative angle", None, -0.2, 0)) == "relative angle: -0.20"
+
+
+def test_a_strip_shows_every_frame_of_the_history_with_its_own_map_the_oldest_first() -> None:
+    images = [np.full((40, 80, 3), level, np.uint8) for level in (60, 90, 120)]
+    reply = Reply("hazard stop", 1.0, 1.0, 1)
+    drawn = still(images, Attention(reply, (MAP, 0 * MAP), (2, 0)), scale=2.0, width=320)
+    assert drawn.shape == (160 + BAR + 80 + BAR + LABEL, 320, 3)
+    strip = drawn[160 + BAR : 160 + BAR + 80]
+    assert (strip[70, 20] == 60).all()  # two frames back
+    assert (strip[:, 160:] == 120).all()  # the present one, of which nothing counts
+    assert strip[30, 130, 0] > 100  # where the map of the oldest is
+    bars = drawn[160 + BAR + 80 : 160 + BAR + 80 + BAR]
+    assert bars[:, :160].mean() > 2 * bars[:, 160:].mean()
+
+
+def test_a_block_of_one_frame_has_no_strip() -> None:
+    attention = Attention(Reply("red light", 0.25, 0.25, 1), (MAP,), (0,))
+    assert (still([IMAGE], attention, 2.0, width=320) == explained(IMAGE, attention, 2.0, width=320)).all()
+
+
+def test_the_truth_stands_beside_the_prediction() -> None:
+    reply = Reply("speed sign 60", 0.25, 60.0, 2)
+    assert said(reply, true_text(BY_NAME["speed_sign"], 90)) == "speed sign 60: 25 %, true: 90"
+    assert [true_text(BY_NAME["red_light"], value) for value in (0.0, 1.0)] == ["no", "yes"]
+    assert [true_text(BY_NAME["speed_sign"], value) for value in (None, 0, 30)] == ["none", "none", "30"]
+    assert true_text(BY_NAME["center_distance"], -0.125) == "-0.12"

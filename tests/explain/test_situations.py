@@ -11,6 +11,9 @@ import torch
 from PIL import Image as Picture
 
 from caldrive.datatypes import Affordances, Command, Semantic
+from caldrive.explain import recorded
+from caldrive.explain.activation_maps import Map
+from caldrive.explain.overlay import BAR, LABEL
 from caldrive.explain.recorded import contact_sheet, figures
 from caldrive.explain.situations import SITUATIONS, find_examples
 from caldrive.perception.network.network import Network
@@ -64,6 +67,8 @@ def test_each_situation_is_found_with_its_history_and_the_thing_in_sight(folder:
     for number, (name, examples) in enumerate(found.items()):
         (example,) = examples
         assert len(example.images) == 5
+        label = LABELS[SITUATIONS[int(example.source[8:13])].name]  # of the episode that it is from
+        assert example.truth == pytest.approx(getattr(label, example.situation.affordance))
         if example.situation.shows:
             assert example.semantics is not None
             assert (example.semantics == example.situation.shows[0]).any()
@@ -85,8 +90,9 @@ def test_episodes_that_are_too_short_end_in_a_sentence(folder: Path) -> None:
 def test_the_sheet_has_a_row_for_each_situation(folder: Path, network: Network, tmp_path: Path) -> None:
     found = find_examples(folder, n=1, history=4, seed=0)
     (tmp_path / "sheet.png").write_bytes(contact_sheet(network, found, width=100))
-    with Picture.open(tmp_path / "sheet.png") as sheet:
-        assert sheet.size == (100, len(SITUATIONS) * (24 + 44 + 26))
+    strips = 2 * (round(88 / 200 * (100 // 3)) + BAR + LABEL) + round(88 / 200 * (100 // 4)) + BAR + LABEL
+    with Picture.open(tmp_path / "sheet.png") as sheet:  # hazards look at three frames, the centre line at four
+        assert sheet.size == (100, len(SITUATIONS) * (24 + 44 + BAR) + strips)
 
 
 def test_the_figures_are_shares_and_the_same_for_a_seed(folder: Path, network: Network) -> None:
@@ -100,3 +106,19 @@ def test_the_figures_are_shares_and_the_same_for_a_seed(folder: Path, network: N
         assert 0 <= curve.insertion <= 1
     assert len(one.cascade) == 6
     assert abs(one.cascade[-1]) < 0.9
+
+
+def test_each_example_has_a_random_map_of_its_own_of_the_resolution_of_its_attention(
+    folder: Path, network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Map] = []
+
+    def random_map(like: Map, size: tuple[int, int], rng: np.random.Generator) -> Map:
+        drawn.append(rng.random(like.shape).astype(np.float32))
+        return np.zeros(size, np.float32)
+
+    monkeypatch.setattr(recorded, "random_map", random_map)
+    found = find_examples(folder, n=2, history=4, seed=0)["straight"]
+    figures(network, {"straight": found})
+    assert [one.shape for one in drawn] == [(11, 25)] * 2 * 4  # of two examples, each of four frames
+    assert len({one.tobytes() for one in drawn}) == len(drawn)

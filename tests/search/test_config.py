@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from caldrive.affordances import SPECS
-from caldrive.search.config import TASKS, SearchConfig
+from caldrive.affordances import CONDITIONAL, SPECS
+from caldrive.search.config import CONDITIONAL_TASKS, TASKS, SearchConfig
 
 
 @pytest.mark.parametrize(
@@ -20,6 +20,10 @@ from caldrive.search.config import TASKS, SearchConfig
         ({"tasks": ("speed",)}, "found --tasks speed, wanted some of hazard_stop, red_light"),
         ({"tasks": ()}, "found --tasks none, wanted some of"),
         ({"tasks": ("red_light", "red_light")}, "found --tasks red_light red_light, wanted some of"),
+        (
+            {"tasks": ("red_light",), "conditioning": True},
+            "found --conditioning with --tasks red_light, .*, wanted relative_angle or center_distance among them",
+        ),
     ],
 )
 def test_settings_that_cannot_be_are_named(settings: dict[str, Any], sentence: str) -> None:
@@ -29,6 +33,11 @@ def test_settings_that_cannot_be_are_named(settings: dict[str, Any], sentence: s
 
 def test_a_task_is_an_affordance() -> None:
     assert list(TASKS) == [spec.name for spec in SPECS]
+    assert list(CONDITIONAL_TASKS) == [spec.name for spec in CONDITIONAL]
+
+
+def test_ways_to_tell_the_command_are_compared_where_one_task_is_told_it() -> None:
+    assert SearchConfig(tasks=("red_light", "center_distance"), conditioning=True).conditioning
 
 
 def test_more_trials_or_tasks_go_on_with_the_same_search() -> None:

@@ -119,6 +119,27 @@ def test_a_search_that_was_stopped_goes_on(quick: list[float], tmp_path: Path) -
     assert quick[:6] == expected
 
 
+def test_fewer_trials_than_there_are_are_the_first(quick: list[float], tmp_path: Path) -> None:
+    few = tune(RIGHT, DEFAULT, tmp_path / "few")
+    many = tune(replace(RIGHT, trials=12), DEFAULT, tmp_path)
+    quick.clear()
+    again = tune(RIGHT, DEFAULT, tmp_path)
+    assert len(quick) == 2  # before and after are judged, and nothing else is driven
+    assert (few.trials, many.trials, again.trials) == (3, 12, 3)
+    assert again.after.controller == few.after.controller != many.after.controller
+
+
+def test_the_file_that_a_search_begins_with_is_not_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "controller.toml"
+    own.write_text("cap = 30.0\n")
+    said = refusal(capsys, "tune", "--auto", "--controller", str(own), "--out", str(tmp_path / "." / ""))
+    assert "which the search would write over, wanted another file: give another --out" in said
+    assert own.read_text() == "cap = 30.0\n"
+    assert list(tmp_path.iterdir()) == [own]
+
+
 def test_a_folder_of_another_search_is_refused(quick: list[float], tmp_path: Path) -> None:
     tune(replace(RIGHT, trials=1), DEFAULT, tmp_path)
     with pytest.raises(ValueError, match=r"found in .* a search with seed 0, wanted 1: type the same"):

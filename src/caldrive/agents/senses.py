@@ -59,15 +59,20 @@ def with_senses(
     require_senses(blind, truth)
     if not blind and not truth:
         return agent
-    perception: Any = getattr(agent, "perception", None)
-    if not callable(getattr(perception, "predict", None)):
+    if not has_perception(agent):
         option, word = ("--blind", "be blind") if blind else ("--truth", "be told the truth")
         raise ValueError(
             f"found that {type(agent).__name__} has no perception that could {word}, wanted an attribute "
             f"`perception` with a method predict: add it, or leave {option} out"
         )
-    agent.perception = OtherSenses(perception, blind, truth, truth_source)  # type: ignore[attr-defined]
+    changeable: Any = agent
+    changeable.perception = OtherSenses(changeable.perception, blind, truth, truth_source)
     return agent
+
+
+def has_perception(agent: Agent) -> bool:
+    """Whether an agent has an attribute `perception` (`interfaces.Perception`), and so affordances."""
+    return callable(getattr(getattr(agent, "perception", None), "predict", None))
 
 
 def require_senses(blind: Sequence[str], truth: Sequence[str] = ()) -> None:

@@ -15,8 +15,8 @@ class Drive(DriveSettings, Configurable):
     """Drive episodes, film them, and write down what happened."""
 
     attention: str | None = None
-    """An affordance whose attention is recorded beside the camera with --record or --view: where the network of
-    caldrive explain looks."""
+    """An affordance, or a class such as speed_sign=60, whose attention is recorded beside the camera with --record or
+    --view: where the network of caldrive explain looks."""
     strict: bool = False
     """End with exit code 1 unless every episode reached its goal."""
 
@@ -29,7 +29,8 @@ class Drive(DriveSettings, Configurable):
         return Answer(report.values(), drive_table(report), int(self.strict and not report.all_reached))
 
     def _attention(self) -> Any:
-        """What draws the attention, where it is asked for. Raises ValueError where nothing would show it."""
+        """What draws the attention, where it is asked for. Raises ValueError where nothing would show it, and where it
+        cannot be drawn."""
         if self.attention is None:
             return None
         if self.record is None and not self.view:
@@ -37,9 +38,12 @@ class Drive(DriveSettings, Configurable):
                 f"found --attention {self.attention} in a drive that is not recorded, wanted --record or --view: type "
                 "--record out/drive.mcap, or caldrive explain drive for a film"
             )
-        from caldrive.explain.attention_video import LiveAttention
+        from caldrive.agents.registry import agent_entry
+        from caldrive.datatypes import CameraConfig
+        from caldrive.explain.live_attention import LiveAttention
 
-        return LiveAttention(self.attention, self.model if self.agent == "cal" else None)
+        camera = agent_entry(self.agent).camera(self) or CameraConfig()
+        return LiveAttention(self.attention, camera, self.model if self.agent == "cal" else None)
 
 
 @dataclass(frozen=True, kw_only=True)

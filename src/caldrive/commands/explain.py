@@ -38,6 +38,7 @@ class Blame(Output):
         found, run = blame(self.folder, self.out or self.folder / FOLDER, self.workers, self.ray, progress)
         values = asdict(found) | {
             "episodes": len(run.results), "rest": found.rest, "blame": {key: found.of(key) for key in found.failures},
+            "shares": found.shares(),
         }  # fmt: skip
         return Answer(values, blame_table(found, run.name, len(run.results)))
 
@@ -47,7 +48,8 @@ class AttentionSettings:
     """What attention is drawn of."""
 
     affordance: UseAppendAction[tuple[str, ...]] = ()
-    """An affordance to draw the attention of; may be given again. Without it hazard_stop and red_light."""
+    """An affordance to draw the attention of, or one of its classes, such as speed_sign=60; may be given again. Without
+    it hazard_stop and red_light."""
     method: Literal["hirescam", "gradcam"] = "hirescam"
     """hirescam: what counted at each place, of 8 x 8 pixels; gradcam: as in the paper, of 16 x 16."""
 
@@ -74,14 +76,19 @@ class ExplainDrive(AttentionSettings, EpisodeSettings, Configurable):
 
 @dataclass(frozen=True, kw_only=True)
 class ExplainPictures(AttentionSettings, PictureSettings, Output):
-    """Film where the network looks in your own video or pictures."""
+    """Film where the network looks in your own video or pictures, or draw it in one."""
 
     out: Path = Path("out/attention.mp4")
-    """The video."""
+    """The video; or a .png file, a still of the last picture, beside it as it is."""
 
     def run(self, progress: Progress) -> Answer:
-        """Looks at the pictures; answers with the video."""
+        """Looks at the pictures; answers with the video or the still."""
+        from caldrive.explain.attention_still import ENDING, draw_still
         from caldrive.explain.attention_video import see_attention
+
+        if self.out.suffix.lower() == ENDING:
+            draw_still(self, self.affordances, self.method)
+            return Answer({"still": str(self.out)}, f"attention in the last picture: {self.out}")
 
         frames = see_attention(self, self.affordances, self.method, progress)
         return Answer({"video": str(self.out), "frames": frames}, f"attention in {frames} pictures: {self.out}")
@@ -172,6 +179,7 @@ class ExplainCounterfactuals(Output):
         from caldrive.explain.counterfactual_episode import StudyConfig
         from caldrive.explain.counterfactual_study import study
         from caldrive.perception.network.checkpoint import read_info
+        from caldrive.provenance import code_version
 
         require_within("--cases", self.cases, 1, 1000, 40)
         require_captum()  # before the drive, not after it
@@ -180,7 +188,8 @@ class ExplainCounterfactuals(Output):
         config = StudyConfig(path, tuple(self.scenarios()), self.cases, self.method, self.seed)
         found = study(config, self.out, self.workers, progress)
         values = {
-            "sheet": str(found.sheet), "found": found.found, "effects": [asdict(one) for one in found.effects],
+            "code": code_version(), "sheet": str(found.sheet), "found": found.found,
+            "effects": [asdict(one) for one in found.effects],
             "observations": [asdict(one) | {"verdict": one.verdict} for one in found.findings],
             "at_the_wheel": asdict(found.gap),
         }  # fmt: skip

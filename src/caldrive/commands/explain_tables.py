@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from caldrive.affordances import SPECS
+from caldrive.provenance import code_version
 
 if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
     from caldrive.explain.blame import Blame
@@ -22,14 +23,21 @@ if TYPE_CHECKING:  # a table waits for neither torch nor SUMO
 
 
 def blame_table(blame: Blame, name: str, episodes: int) -> Group:
-    """A row for each affordance, and for what none of them is to blame for."""
-    failures = len(blame.failures)
-    table = Table("affordance", "rescued by its truth", "fail with it alone seen", box=SIMPLE_HEAD)
-    for spec in SPECS:
-        table.add_row(spec.title, str(len(blame.rescued[spec.name])), str(len(blame.spoilt[spec.name])))
-    table.add_row("all of them", str(len(blame.rescued["all"])), "")
-    table.add_row("controller and world", "", str(len(blame.rest)))
-    return Group(Text(f"{name}: {failures} of {episodes} episodes went wrong"), table)
+    """A row for each affordance and for what else failures come from; the first column adds up to all of them."""
+    table = Table("to blame", "failures", "rescued by its truth", "fail with it alone seen", box=SIMPLE_HEAD)
+    by_title = {spec.title: spec.name for spec in SPECS}
+    for title, count in blame.shares().items():
+        of_it = by_title.get(title)
+        more = (str(len(blame.rescued[of_it])), str(len(blame.spoilt[of_it]))) if of_it else ()
+        table.add_row(title, str(count), *more)
+    table.add_row("all of them", str(len(blame.failures)), str(len(blame.rescued["all"])))
+    said = [f"{name}: {len(blame.failures)} of {episodes} episodes went wrong"]
+    if blame.unlike:
+        said.append(
+            f"{len(blame.unlike)} of them did not go as before when they were driven again with nothing told: this "
+            "agent does not do the same each time"
+        )
+    return Group(*map(Text, said), table)
 
 
 def attention_table(figures: Sequence[Figures], out: Path) -> Group:
@@ -60,7 +68,7 @@ def study_table(study: Study) -> Group:
         f"left out, as the network saw them wrong: {', '.join(missed) or 'none'}",
         f"at the wheel, in 8-bit integers, {gap.other_answers} of {gap.cases} answers are other ones; probabilities "
         f"differ by {gap.difference:.3f} on average",
-        f"sheet: {study.sheet}",
+        f"driven by {code_version()}; sheet: {study.sheet}",
     ]
     return Group(_effect_table(study.effects), _finding_table(study.findings), *map(Text, notes))
 

@@ -39,6 +39,7 @@ class Tune(Configurable):
         controller, path = controller_config(self.controller, None), self.out / "controller.toml"
         require_writable_folder(self.out)
         if self.auto:
+            _require_other_file(self.controller, path)
             from caldrive.commands.tables import tuning_table
             from caldrive.tune.auto import tune
             from caldrive.tune.report import report_values, write_report
@@ -61,3 +62,12 @@ class Tune(Configurable):
 def _saved_at(path: Path) -> int | None:
     """When a file was written, in ns; None where there is none."""
     return path.stat().st_mtime_ns if path.is_file() else None
+
+
+def _require_other_file(controller: str, path: Path) -> None:
+    """Raises ValueError where a search would write over the file that it begins with."""
+    if Path(controller).resolve() == path.resolve():
+        raise ValueError(
+            f"found --controller {controller}, which the search would write over, wanted another file: give another "
+            "--out"
+        )

@@ -14,7 +14,7 @@ which have no gradient.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -53,15 +53,30 @@ class Question:
                 f"found affordance {self.affordance!r}, wanted one of {', '.join(BY_NAME)}: type one of them"
             )
         if self.label is not None and self.label not in self.spec.classes:
-            classes = ", ".join(map(str, self.spec.classes)) or "none, as it is a number"
-            raise ValueError(
-                f"found class {self.label} of {self.spec.title}, wanted one of its classes ({classes}): give one"
-            )
+            raise ValueError(_no_class(self.spec, str(self.label)))
+
+    @classmethod
+    def parse(cls, text: str) -> Question:
+        """A question as one types it: an affordance's name, with a class of it where that is asked for, such as
+        speed_sign=60. Raises ValueError as above."""
+        name, equals, label = text.partition("=")
+        question = cls(name)
+        labels = {str(value): value for value in question.spec.classes}
+        if equals and label not in labels:
+            raise ValueError(_no_class(question.spec, label))
+        return replace(question, label=labels[label]) if equals else question
 
     @property
     def spec(self) -> AffordanceSpec:
         """The affordance's row."""
         return BY_NAME[self.affordance]
+
+
+def _no_class(spec: AffordanceSpec, found: str) -> str:
+    """What to say where an affordance has no such class."""
+    classes = ", ".join(map(str, spec.classes)) or "none, as it is a number"
+    wanted = f"{spec.name}={spec.classes[-1]}" if spec.classes else spec.name
+    return f"found class {found} of {spec.title}, wanted one of its classes ({classes}): type {wanted}"
 
 
 @dataclass(frozen=True)
@@ -132,6 +147,13 @@ def frames_back(network: Network, affordance: str) -> tuple[int, ...]:
     return tuple(k * config.dilation for k in reversed(range(config.length)))
 
 
+def frames_at(images: Sequence[Image], back: Sequence[int]) -> list[Image]:
+    """The images (H, W, 3) that lie so many frames back, of some that end with the present one; where there are fewer,
+    the first one stands for those before it."""
+    last = len(images) - 1
+    return [images[max(0, last - frames)] for frames in back]
+
+
 def upsampled(one: Map, size: tuple[int, int]) -> Map:
     """A map (h, w) at the size (H, W) of an image, bilinear."""
     grid = torch.from_numpy(one)[None, None]
@@ -157,9 +179,7 @@ def _batch(network: Network, question: Question, images: Sequence[Image]) -> Ten
             f"found images of {width} x {height}, wanted {wanted[1]} x {wanted[0]} as this network takes them: give "
             "--model with one for these"
         )
-    last = len(images) - 1
-    chosen = [images[max(0, last - frames)] for frames in frames_back(network, question.affordance)]
-    return normalise(to_float(np.stack(chosen)))
+    return normalise(to_float(np.stack(frames_at(images, frames_back(network, question.affordance)))))
 
 
 def _outputs(network: Network, question: Question, images: Tensor) -> Tensor:

@@ -1,5 +1,4 @@
-"""Where the network looks as moving pictures: a video of a drive or of a person's own pictures, and while a car
-drives."""
+"""Where the network looks as moving pictures: a video of a drive, or of a person's own pictures."""
 
 from __future__ import annotations
 
@@ -8,12 +7,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 import numpy as np
 
+from caldrive.agents.registry import agent_entry
 from caldrive.agents.rows import model_path
 from caldrive.checks import require_within, require_writable_file
-from caldrive.datatypes import Command, Image, Observation
+from caldrive.datatypes import Affordances, CameraConfig, Command, Image
 from caldrive.driving.choice import chosen_scenarios
 from caldrive.driving.pictures import open_source
 from caldrive.driving.referee import Referee
@@ -22,7 +24,7 @@ from caldrive.driving.see import at_size, kept_rows, parse_crop
 from caldrive.driving.settings import EpisodeSettings, PictureSettings
 from caldrive.driving.setup import set_up
 from caldrive.explain.activation_maps import Attention, Question, attend
-from caldrive.explain.overlay import explained, scale_of
+from caldrive.explain.overlay import explained, scale_of, true_text
 from caldrive.perception.network.checkpoint import load_network
 from caldrive.perception.network.network import Network
 from caldrive.progress import Progress, silent
@@ -41,6 +43,8 @@ class Scene:
     command: Command
     done: float
     """How far the drive or the video has come, in [0, 1]."""
+    truth: Affordances | None = None
+    """What is true in it, where that is known."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class Looked:
 
     scene: Scene
     attentions: tuple[Attention, ...]
+    truths: tuple[str, ...]
+    """What is true of each affordance, by `true_text`; empty where that is not known."""
 
 
 def drive_attention(
@@ -58,6 +64,7 @@ def drive_attention(
     package's); returns its number of frames. Raises ValueError for settings that cannot be."""
     questions = _checked(affordances, out)
     network, _ = load_network(model_path(settings.model if settings.agent == "cal" else None))
+    require_camera(agent_entry(settings.agent).camera(settings) or CameraConfig(), network)
     scenes = _driven(settings)
     return _write(network, scenes, questions, method, out, 10.0, progress)
 
@@ -70,14 +77,24 @@ def see_attention(
     require_within("--every", settings.every, 1, 1_000_000, 1)
     network, _ = load_network(model_path(settings.model))
     source = open_source(settings.source, settings.every)
-    scenes = _pictures(settings, network.config.image_size)
+    scenes = own_scenes(settings, network.config.image_size)
     return _write(network, scenes, questions, method, settings.out, source.rate / source.every, progress)
 
 
 def _checked(affordances: Sequence[str], out: Path) -> list[Question]:
     """The questions, without a command. Raises ValueError where one, or the video's name, cannot be."""
     require_writable_file(out, "--out", ".mp4")
-    return [Question(name) for name in affordances]
+    return [Question.parse(text) for text in affordances]
+
+
+def require_camera(camera: CameraConfig, network: Network) -> None:
+    """Raises ValueError where an agent's camera does not give what a network takes."""
+    height, width = network.config.image_size
+    if (camera.width, camera.height) != (width, height):
+        raise ValueError(
+            f"found an agent whose camera gives {camera.width} x {camera.height}, wanted {width} x {height} as the "
+            "network takes them that is asked where it looks: take another --agent, or do without attention"
+        )
 
 
 def _driven(settings: EpisodeSettings) -> Iterator[Scene]:
@@ -89,12 +106,12 @@ def _driven(settings: EpisodeSettings) -> Iterator[Scene]:
         for step in rollout(world, agent, scenario):
             outcome = referee.watch(step.truth)
             done = min(1.0, step.truth.route_done / step.truth.route_length)
-            yield Scene(step.observation.image, step.observation.command, done)
+            yield Scene(step.observation.image, step.observation.command, done, step.truth.affordances)
             if outcome is not None:
                 return
 
 
-def _pictures(settings: PictureSettings, size: tuple[int, int]) -> Iterator[Scene]:
+def own_scenes(settings: PictureSettings, size: tuple[int, int]) -> Iterator[Scene]:
     """A person's own pictures in the network's size (height, width)."""
     source, command = open_source(settings.source, settings.every), Command(settings.command)
     crop = None if settings.crop is None else parse_crop(settings.crop)
@@ -109,15 +126,36 @@ def _write(
     network: Network, scenes: Iterable[Scene], questions: Sequence[Question], method: str, out: Path, rate: float,
     progress: Progress,
 ) -> int:  # fmt: skip
-    """Writes the video. All scenes come before its first frame: one scale holds for all of them."""
-    looked = list(look(network, scenes, questions, method, progress))
-    if not looked:
-        raise ValueError("found no picture, wanted one at least: give another file")
-    scales = [scale_of([one.attentions[k].now for one in looked]) for k in range(len(questions))]
-    with VideoWriter(out, rate=rate) as video:
-        for one in looked:
-            video.add(panels(one, scales))
+    """Writes the video. All scenes come before its first frame, as one scale holds for all of them: meanwhile their
+    arrays lie in a file without a name."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=out.parent) as file:
+        looked = [_put_away(file, one) for one in look(network, scenes, questions, method, progress)]
+        if not looked:
+            raise ValueError("found no picture, wanted one at least: give another file")
+        scales = [scale_of([one.attentions[k].now for one in looked]) for k in range(len(questions))]
+        file.seek(0)
+        with VideoWriter(out, rate=rate) as video:
+            for one in looked:
+                video.add(panels(_taken_back(file, one), scales))
     return len(looked)
+
+
+def _put_away(file: IO[bytes], looked: Looked) -> Looked:
+    """Writes the arrays of a scene; what is left has the present maps alone, from which the scale is made."""
+    np.save(file, looked.scene.image, allow_pickle=False)
+    for attention in looked.attentions:
+        np.save(file, np.stack(attention.maps), allow_pickle=False)
+    attentions = (replace(attention, maps=(attention.now.copy(),)) for attention in looked.attentions)
+    scene = replace(looked.scene, image=np.empty((0, 0, 3), np.uint8))
+    return replace(looked, scene=scene, attentions=tuple(attentions))
+
+
+def _taken_back(file: IO[bytes], left: Looked) -> Looked:
+    """The next scene, with its arrays."""
+    scene = replace(left.scene, image=np.load(file, allow_pickle=False))
+    attentions = (replace(one, maps=tuple(np.load(file, allow_pickle=False))) for one in left.attentions)
+    return replace(left, scene=scene, attentions=tuple(attentions))
 
 
 def look(
@@ -133,41 +171,34 @@ def look(
             for question in questions
         )
         progress("attention", scene.done)
-        yield Looked(scene, attentions)
+        yield Looked(scene, attentions, tuple(_truth(question, scene.truth) for question in questions))
+
+
+def _truth(question: Question, truth: Affordances | None) -> str:
+    """What is true of an affordance, by `true_text`; empty where that is not known."""
+    return "" if truth is None else true_text(question.spec, getattr(truth, question.affordance))
 
 
 def panels(looked: Looked, scales: Sequence[float]) -> Image:
     """A frame: a panel for each affordance, two beside each other."""
     drawn = [
-        explained(looked.scene.image, attention, scale, width=PANEL_WIDTH)
-        for attention, scale in zip(looked.attentions, scales, strict=True)
+        explained(looked.scene.image, attention, scale, width=PANEL_WIDTH, truth=truth)
+        for attention, scale, truth in zip(looked.attentions, scales, looked.truths, strict=True)
     ]
-    columns = min(COLUMNS, len(drawn))
-    drawn += [np.full_like(drawn[0], BACKGROUND)] * (-len(drawn) % columns)
-    rows = [np.concatenate(drawn[k : k + columns], axis=1) for k in range(0, len(drawn), columns)]
-    frame = np.concatenate(rows)
+    frame = grid(drawn)
     return frame[: frame.shape[0] // 2 * 2]
 
 
-class LiveAttention:
-    """Draws the attention to one affordance while a car drives, for recordings. Its scale is the largest so far: what
-    comes is not known yet. model: the network, None for the one in the package."""
+def grid(drawn: Sequence[Image]) -> Image:
+    """Pictures of one width, two beside each other, each row as high as its highest."""
+    columns = min(COLUMNS, len(drawn))
+    rows = [_row(drawn[k : k + columns], columns * drawn[0].shape[1]) for k in range(0, len(drawn), columns)]
+    return np.concatenate(rows)
 
-    def __init__(self, affordance: str, model: Path | None = None, method: str = "hirescam") -> None:
-        self.question, self.method = Question(affordance), method
-        self.network, _ = load_network(model_path(model))
-        self._history: deque[Image] = deque(maxlen=self.network.span)
-        self._scale, self._time = 0.0, 0.0
 
-    def __call__(self, observation: Observation) -> Image | None:
-        """The picture of an observation; None where its image is of another size than the network's."""
-        if observation.image.shape[:2] != self.network.config.image_size:
-            return None
-        if observation.time < self._time:  # another episode
-            self._history.clear()
-        self._time = observation.time
-        self._history.append(observation.image)
-        question = replace(self.question, command=observation.command)
-        attention = attend(self.network, question, list(self._history), self.method)
-        self._scale = max(self._scale, scale_of([attention.now]))
-        return explained(observation.image, attention, self._scale, width=PANEL_WIDTH)
+def _row(drawn: Sequence[Image], width: int) -> Image:
+    """Pictures beside each other, so many pixels wide."""
+    row = np.full((max(len(one) for one in drawn), width, 3), BACKGROUND, np.uint8)
+    for k, one in enumerate(drawn):
+        row[: len(one), k * one.shape[1] : (k + 1) * one.shape[1]] = one
+    return row

@@ -2,8 +2,8 @@
 
 * Pointing game and energy (Zhang et al. 2018; Wang et al. 2020): the recording's semantic images say where a thing is.
 * Deletion and insertion (RISE, Petsiuk et al. 2018), beside a random map and one that always looks at the middle.
-* Cascading randomisation (Adebayo et al. 2018): a map that stays as it is while the weights are replaced, from the last
-  layer to the first, shows edges and not what was learnt.
+* Cascading randomisation (Adebayo et al. 2018): a map that stays as it is while weights and norms are replaced, from
+  the last layer to the first, shows edges and not what was learnt.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ ABOUT = {
 }  # fmt: skip
 TOLERANCE = 0.03  # of an image's width: the usual 15 pixels of 500
 STEPS = 16  # of a deletion or an insertion
+LEARNT = (nn.Linear, nn.Conv2d, nn.GRU, nn.LSTM, nn.BatchNorm1d, nn.BatchNorm2d, nn.LayerNorm)
 BLUR = 8.0  # pixels, standard deviation of what takes a deleted place
 
 
@@ -82,10 +83,9 @@ def _blurred(image: Image) -> Image:
     return np.asarray(gaussian_filter(image, (BLUR, BLUR, 0)))
 
 
-def random_map(size: tuple[int, int], rng: np.random.Generator) -> Map:
-    """A map that knows nothing, as coarse as a real one."""
-    cells = rng.random((max(1, size[0] // 16), max(1, size[1] // 16))).astype(np.float32)
-    return upsampled(cells, size)
+def random_map(like: Map, size: tuple[int, int], rng: np.random.Generator) -> Map:
+    """A map (H, W) that knows nothing, of as many places (h, w) as a real one."""
+    return upsampled(rng.random(like.shape).astype(np.float32), size)
 
 
 def centred_map(size: tuple[int, int]) -> Map:
@@ -108,14 +108,16 @@ def score_of(network: Network, question: Question, images: Sequence[Image]) -> S
 
 
 def randomised(network: Network, affordance: str, stages: int, seed: int) -> Network:
-    """A copy whose block of an affordance has new weights, and so many of the last stages of its backbone."""
+    """A copy whose block of an affordance is as before any training, with new weights and unused norms, and so many of
+    the last stages of its backbone."""
     other = copy.deepcopy(network)
-    backbone = list(other.backbone.stages)
-    parts: list[nn.Module] = [other.task_blocks()[affordance], *backbone[len(backbone) - stages :]]
+    convolutions, norms = list(other.backbone.stages), list(other.backbone.norms)
+    first = len(convolutions) - stages
+    parts: list[nn.Module] = [other.task_blocks()[affordance], *convolutions[first:], *norms[first:]]
     with torch.random.fork_rng([]):
         torch.manual_seed(seed)
         for layer in (layer for part in parts for layer in part.modules()):
-            if isinstance(layer, nn.Linear | nn.Conv2d | nn.GRU | nn.LSTM):
+            if isinstance(layer, LEARNT):
                 layer.reset_parameters()
     return other
 

@@ -2,7 +2,8 @@
 opacity how much attention a place gets; what gets none stays as it is.
 
 What makes a value larger is orange, what makes it smaller blue. One scale holds for a whole drive: with a scale of its
-own for each image, noise would look like attention wherever there is nothing to see.
+own for each image, noise would look like attention wherever there is nothing to see. A still has a strip below it with
+all frames that the block looks at, on one scale.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 from PIL import Image as Picture
 from PIL import ImageDraw
 
+from caldrive.affordances import AffordanceSpec
 from caldrive.datatypes import Image
-from caldrive.explain.activation_maps import Attention, Map, Reply, upsampled
+from caldrive.explain.activation_maps import Attention, Map, Reply, frames_at, upsampled
 from caldrive.visualization.gauges import BACKGROUND, MUTED, Draw, write
 
 GREEN, YELLOW, RED = (46, 160, 67), (250, 204, 21), (220, 38, 38)
@@ -24,6 +26,7 @@ STRONGEST = 0.75  # opacity of the scale's end
 FAINT = 0.08  # share of the scale below which a place stays transparent
 SCALE_PERCENTILE = 99.0  # of all places of a drive's maps
 BAR = 26  # pixels of height below an image, for how far back the block looks
+LABEL = 14  # and for what a frame of a strip is called
 
 
 def scale_of(maps: Sequence[Map]) -> float:
@@ -52,25 +55,65 @@ def overlay(image: Image, one: Map, scale: float, probability: float | None) -> 
     return mixed.round().astype(np.uint8)
 
 
-def explained(image: Image, attention: Attention, scale: float, *, width: int = 640) -> Image:
+def explained(image: Image, attention: Attention, scale: float, *, width: int = 640, truth: str = "") -> Image:
     """An image with the attention over it, so many pixels wide, and below it what is asked and how far back the block
-    looks."""
-    height = round(image.shape[0] * width / image.shape[1])
-    large = np.asarray(Picture.fromarray(image).resize((width, height), Picture.Resampling.BICUBIC))
-    picture = Picture.new("RGB", (width, height + BAR), BACKGROUND)
-    picture.paste(Picture.fromarray(overlay(large, attention.now, scale, attention.reply.probability)))
-    draw = ImageDraw.Draw(picture)
-    write(draw, (8, height + BAR / 2), said(attention.reply), 14)
+    looks. truth: by `true_text`, where it is known."""
+    picture, draw, top = _page(image, attention, scale, width, BAR, truth)
     if len(attention.maps) > 1:
-        _draw_bar(draw, attention, (width - 208, height + 5, width - 8, height + BAR - 5))
+        _draw_bar(draw, attention, (width - 208, top + 5, width - 8, top + BAR - 5))
     return np.asarray(picture)
 
 
-def said(reply: Reply) -> str:
-    """What is asked, and what the network says."""
-    if reply.probability is not None:
-        return f"{reply.label}: {100 * reply.probability:.0f} %"
-    return f"{reply.label}: {reply.value:.2f}"
+def still(images: Sequence[Image], attention: Attention, scale: float, *, width: int = 640, truth: str = "") -> Image:
+    """The same of the newest of some images, with a strip of all frames that the block looks at, the oldest first: each
+    with its attention, and below it its share of all attention and how far back it lies."""
+    frames = frames_at(images, attention.back)
+    if len(frames) == 1:
+        return explained(images[-1], attention, scale, width=width, truth=truth)
+    cell = width // len(frames)
+    height = round(images[-1].shape[0] * cell / images[-1].shape[1])
+    picture, draw, top = _page(images[-1], attention, scale, width, BAR + height + BAR + LABEL, truth)
+    for k, (frame, one) in enumerate(zip(frames, attention.maps, strict=True)):
+        small = overlay(_resized(frame, (cell, height)), one, scale, attention.reply.probability)
+        picture.paste(Picture.fromarray(small), (k * cell, top + BAR))
+        back = f"{attention.back[k]} frames back" if attention.back[k] else "now"
+        write(draw, ((k + 0.5) * cell, top + height + 2 * BAR + LABEL / 2), back, 10, MUTED, "mm")
+    _draw_bar(draw, attention, (0, top + BAR + height + 3, cell * len(frames), top + height + 2 * BAR - 2))
+    return np.asarray(picture)
+
+
+def _page(
+    image: Image, attention: Attention, scale: float, width: int, below: int, truth: str
+) -> tuple[Picture.Image, Draw, int]:
+    """An image with the attention over it and so many pixels below it, which begin with what is asked; its pen, and
+    where they begin."""
+    height = round(image.shape[0] * width / image.shape[1])
+    picture = Picture.new("RGB", (width, height + below), BACKGROUND)
+    large = overlay(_resized(image, (width, height)), attention.now, scale, attention.reply.probability)
+    picture.paste(Picture.fromarray(large))
+    draw = ImageDraw.Draw(picture)
+    write(draw, (8, height + BAR / 2), said(attention.reply, truth), 14)
+    return picture, draw, height
+
+
+def _resized(image: Image, size: tuple[int, int]) -> Image:
+    """An image at the size (width, height)."""
+    return np.asarray(Picture.fromarray(image).resize(size, Picture.Resampling.BICUBIC))
+
+
+def said(reply: Reply, truth: str = "") -> str:
+    """What is asked, and what the network says; truth: by `true_text`, where it is known."""
+    answer = f"{reply.value:.2f}" if reply.probability is None else f"{100 * reply.probability:.0f} %"
+    return f"{reply.label}: {answer}, true: {truth}" if truth else f"{reply.label}: {answer}"
+
+
+def true_text(spec: AffordanceSpec, value: float | None) -> str:
+    """An affordance's true value: yes or no, a class, or a number in SI units; None stands for no sign."""
+    if spec.binary:
+        return "yes" if value else "no"
+    if spec.discrete:
+        return f"{value:.0f}" if value else "none"
+    return f"{value:.2f}"
 
 
 def _draw_bar(draw: Draw, attention: Attention, box: tuple[int, int, int, int]) -> None:

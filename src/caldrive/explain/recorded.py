@@ -12,7 +12,7 @@ from PIL import Image as Picture
 from PIL import ImageDraw
 
 from caldrive.datatypes import Image
-from caldrive.explain.activation_maps import Attention, Map, attend, upsampled
+from caldrive.explain.activation_maps import Attention, Map, attend, frames_at, upsampled
 from caldrive.explain.faithfulness import (
     Curve,
     about,
@@ -25,7 +25,7 @@ from caldrive.explain.faithfulness import (
     score_of,
     similarity,
 )
-from caldrive.explain.overlay import explained, scale_of
+from caldrive.explain.overlay import scale_of, still, true_text
 from caldrive.explain.situations import Example
 from caldrive.perception.network.network import Network
 from caldrive.progress import Progress, silent
@@ -58,9 +58,12 @@ def _row(network: Network, examples: Sequence[Example], method: str, width: int)
     """Examples beside each other, each with a scale of its own: they are of different drives."""
     attentions = [attend(network, example.question, example.images, method) for example in examples]
     pictures = [
-        explained(example.images[-1], attention, scale_of([attention.now]), width=width)
+        still(
+            example.images, attention, scale_of(attention.maps), width=width,
+            truth=true_text(example.question.spec, example.truth),
+        )
         for example, attention in zip(examples, attentions, strict=True)
-    ]
+    ]  # fmt: skip
     return np.concatenate(pictures, axis=1)
 
 
@@ -124,8 +127,9 @@ def _where(example: Example, attention: Attention) -> tuple[float, float, float]
 
 def _curves(network: Network, example: Example, attention: Attention, seed: int) -> tuple[Curve, Curve, Curve]:
     """Of the attention, of random maps and of one of the middle, in all frames that the block looks at."""
-    size, rng = example.images[-1].shape[:2], np.random.default_rng(seed)
-    images = [example.images[max(0, len(example.images) - 1 - back)] for back in attention.back]
+    size = example.images[-1].shape[:2]
+    rng = np.random.default_rng((seed, *example.source.encode()))  # the same maps for all would be a single control
+    images = frames_at(example.images, attention.back)
     score = score_of(network, example.question, example.images)
 
     def on_history(changed: Sequence[Image]) -> float:
@@ -136,7 +140,7 @@ def _curves(network: Network, example: Example, attention: Attention, seed: int)
 
     maps: list[list[Map]] = [
         [upsampled(one, size) for one in attention.maps],
-        [random_map(size, rng) for _ in images],
+        [random_map(one, size, rng) for one in attention.maps],
         [centred_map(size)] * len(images),
     ]
     first, second, third = (curve(images, one, on_history) for one in maps)

@@ -79,6 +79,8 @@ class Example:
     semantics: NDArray[np.uint8] | None
     """Its semantic image (H, W), where it was recorded."""
     command: Command
+    truth: float
+    """The label of the affordance that matters, 0 for no sign."""
     source: str
     """Its episode and row."""
 
@@ -129,8 +131,8 @@ def _examples(episode: Episode, history: int, rng: np.random.Generator) -> Itera
             semantics = episode.semantic(i) if episode.semantics is not None else None
             if semantics is None or _shows(semantics, situation.shows):
                 images = tuple(episode.image(j) for j in range(i - history, i + 1))
-                command = Command(columns["command"][i])
-                yield Example(situation, images, semantics, command, f"{episode.path.stem}, row {i}")
+                command, truth = Command(columns["command"][i]), float(columns[situation.affordance][i])
+                yield Example(situation, images, semantics, command, truth, f"{episode.path.stem}, row {i}")
                 break
 
 

@@ -9,6 +9,7 @@ from caldrive.checks import MOST_SEED, Limits, require_limits
 
 Task = Literal["hazard_stop", "red_light", "speed_sign", "vehicle_distance", "relative_angle", "center_distance"]
 TASKS: tuple[Task, ...] = get_args(Task)
+CONDITIONAL_TASKS: tuple[Task, ...] = ("relative_angle", "center_distance")  # whose blocks are told the command
 
 LIMITS: Limits = {
     "trials": (1, 100_000),
@@ -72,6 +73,11 @@ class SearchConfig:
         if unknown or not self.tasks or len(set(self.tasks)) < len(self.tasks):
             found = unknown[0] if unknown else " ".join(self.tasks) or "none"
             raise ValueError(f"found --tasks {found}, wanted some of {', '.join(TASKS)}: type --tasks hazard_stop")
+        if self.conditioning and not set(self.tasks) & set(CONDITIONAL_TASKS):
+            raise ValueError(
+                f"found --conditioning with --tasks {' '.join(self.tasks)}, whose blocks are not told the command, "
+                f"wanted {' or '.join(CONDITIONAL_TASKS)} among them: leave --conditioning out"
+            )
 
     def decisive(self) -> dict[str, Any]:
         """The settings on which a trial depends."""

@@ -97,10 +97,14 @@ def open_study(out: Path, config: TuneConfig, number: int = 0) -> Any:
 
 def missing_trials(out: Path, config: TuneConfig) -> list[int]:
     """The numbers of the trials that are still to be done."""
-    study = open_study(out, config)
-    abandon(study)
-    done = {trial.user_attrs[NUMBER] for trial in finished(study, NUMBER)}
+    abandon(open_study(out, config))
+    done = {trial.user_attrs[NUMBER] for trial in done_trials(out, config)}
     return [number for number in range(config.trials) if number not in done]
+
+
+def done_trials(out: Path, config: TuneConfig) -> list[Any]:
+    """The trials that are whole or pruned; of a search that once had more trials than are asked for now, its first."""
+    return [trial for trial in finished(open_study(out, config), NUMBER) if trial.user_attrs[NUMBER] < config.trials]
 
 
 def run_trial(out: Path, config: TuneConfig, controller: ControlConfig, number: int) -> float | None:
@@ -154,7 +158,7 @@ def _searched(config: TuneConfig, controller: ControlConfig) -> dict[str, Consta
 def best_controller(out: Path, config: TuneConfig, controller: ControlConfig) -> ControlConfig:
     """That of the cheapest whole trial; the controller itself where none was whole."""
     complete = require_optuna().trial.TrialState.COMPLETE
-    whole = [trial for trial in finished(open_study(out, config), NUMBER) if trial.state == complete]
+    whole = [trial for trial in done_trials(out, config) if trial.state == complete]
     if not whole:
         return controller
     best = min(whole, key=lambda trial: (trial.value, trial.user_attrs[NUMBER]))
@@ -169,7 +173,7 @@ def _findings(
     before, after = _judged(config, judges, workers, progress)
     if after.tuned.total(config.cost) >= before.tuned.total(config.cost):
         after = before
-    trials = finished(open_study(out, config), NUMBER)
+    trials = done_trials(out, config)
     pruned = sum(trial.state == require_optuna().trial.TrialState.PRUNED for trial in trials)
     return TuningResult(before, after, len(trials), pruned)
 

@@ -11,17 +11,16 @@ from caldrive.benchmark.artifacts import read_still, still_paths
 from caldrive.benchmark.metrics import succeeded
 from caldrive.benchmark.report.runs import BenchmarkRun, Failure, FailureMoment, failures
 
-PICTURE_BYTES = 1_900_000  # of all pictures; on the page they take a third more, and it is to stay below 3 MB
 ATTENTION = (
     "The second picture of a moment shows what the network looks at (HiResCAM), each on a scale of its own. Of a "
     "class, green to red says how likely the network finds it; of a number, orange makes it larger and blue smaller."
 )
 
 
-def failures_section(runs: Sequence[BenchmarkRun]) -> str:
-    """The section with all failures of some runs."""
+def failures_section(runs: Sequence[BenchmarkRun], room: int) -> str:
+    """The section with all failures of some runs. room: bytes of HTML that their pictures may take."""
     failed, folders = failures(runs), {run.name: run.folder for run in runs}
-    pictures = _chosen_pictures(failed, folders)
+    pictures = _chosen_pictures(failed, folders, room)
     cards = [_card(failure, pictures.get(k, "")) for k, failure in enumerate(failed)]
     text = (
         f'<p><span id="shown">{len(failed)}</span> of {len(failed)} episodes that missed their goal or broke a rule.'
@@ -38,26 +37,25 @@ def by_importance(failed: Sequence[Failure]) -> list[int]:
     return sorted(range(len(failed)), key=lambda k: not failed[k].result.episode.infractions)
 
 
-def _chosen_pictures(failed: Sequence[Failure], folders: Mapping[str, Path]) -> dict[int, str]:
-    """The pictures of as many failures as PICTURE_BYTES allow, by the failures' numbers."""
-    chosen, left = dict[int, str](), PICTURE_BYTES
+def _chosen_pictures(failed: Sequence[Failure], folders: Mapping[str, Path], room: int) -> dict[int, str]:
+    """The pictures of as many failures as fit into so many bytes, by the failures' numbers; one whose pictures are too
+    large leaves its place to the next."""
+    chosen, left = dict[int, str](), room
     for k in by_importance(failed):
-        html, size = _pictures(failed[k], folders[failed[k].run])
-        left -= size
-        if left < 0:
-            break
-        if size:
+        html = _pictures(failed[k], folders[failed[k].run]) if left > 0 else ""
+        size = len(html.encode())
+        if 0 < size <= left:
             chosen[k] = html
+            left -= size
     return chosen
 
 
-def _pictures(failure: Failure, folder: Path) -> tuple[str, int]:
-    """A failure's moments, or else the stills of its benchmark, and how many bytes the pictures have."""
+def _pictures(failure: Failure, folder: Path) -> str:
+    """A failure's moments, or else the stills of its benchmark; empty where it has none."""
     moments = failure.explanation.moments or [
         FailureMoment("", "", read_still(path)) for path in still_paths(folder, failure.result.trial.key)
     ]
-    size = sum(len(moment.still) + len(moment.attention or b"") for moment in moments)
-    return f'<div class="moments">{"".join(map(_moment, moments))}</div>', size
+    return f'<div class="moments">{"".join(map(_moment, moments))}</div>' if moments else ""
 
 
 def _moment(moment: FailureMoment) -> str:

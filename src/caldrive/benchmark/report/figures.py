@@ -1,5 +1,4 @@
-"""The report's figures, as SVG: success beside the paper's, where infractions happened, errors over time, speed over
-distance."""
+"""The report's figures, as SVG: success beside the paper's, errors over time, speed over distance."""
 
 from __future__ import annotations
 
@@ -18,14 +17,9 @@ from caldrive.benchmark.artifacts import read_trace
 from caldrive.benchmark.published import SYSTEMS, success
 from caldrive.benchmark.report.runs import BenchmarkRun, cells_by_place, suites
 from caldrive.datatypes import KMH
-from caldrive.results import Infraction, InfractionKind
-from caldrive.world.roads.towns import load_roads
 
 RUN_COLORS = ("#1f4e79", "#c8782d", "#4f8a4c", "#8a4c86", "#777777")
-RUN_MARKERS = "os^Dv"
 SYSTEM_MARKERS = dict(zip(SYSTEMS, "xv^D", strict=True))
-_COLORS = ("#e0a100", "#8a4c86", "#d9534f", "#444444", "#1f77b4", "#e377c2", "#f0d000", "#2ca02c")
-KIND_COLORS = dict(zip(InfractionKind, _COLORS, strict=True))
 BIN, BINS = 5.0, 240  # s of a bin of time, and how many there are; the last one takes what is later
 MIN_STEPS = 50  # in a bin, from which its mean is drawn
 
@@ -83,34 +77,6 @@ def _mark_published(ax: Axes, places: Sequence[tuple[str, str]], of: Collection[
 
 def _run_color(k: int) -> str:
     return RUN_COLORS[k % len(RUN_COLORS)]
-
-
-def map_figure(runs: Sequence[BenchmarkRun], town: str) -> str:
-    """Where in a town infractions happened; others' faults are hollow."""
-    figure = Figure(figsize=(7, 6), layout="constrained")
-    ax = figure.subplots()
-    for lane in load_roads(town).lanes.values():
-        ax.plot(*lane.line.points.T, color="#cccccc", lw=1.5, zorder=1)
-    labels = set()
-    for k, run in enumerate(runs):
-        for infraction in _infractions_in(run, town):
-            label = f"{run.name}: {infraction.kind.value}"
-            color = KIND_COLORS[infraction.kind]
-            ax.scatter(
-                infraction.x, infraction.y, 26, facecolors=color if infraction.at_fault else "none", edgecolors=color,
-                marker=RUN_MARKERS[k % len(RUN_MARKERS)], label=None if label in labels else label, zorder=2,
-            )  # fmt: skip
-            labels.add(label)
-    ax.set(aspect="equal", title=town, xlabel="m", ylabel="m")
-    if labels:
-        figure.legend(loc="outside right upper", fontsize=7)
-    return svg(figure)
-
-
-def _infractions_in(run: BenchmarkRun, town: str) -> Iterator[Infraction]:
-    for result in run.results:
-        if result.trial.scenario.town == town:
-            yield from result.episode.infractions
 
 
 def _legend(ax: Axes) -> None:

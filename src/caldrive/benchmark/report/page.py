@@ -8,24 +8,31 @@ from html import escape
 from pathlib import Path
 
 from caldrive.benchmark.report.failure_cards import failures_section
-from caldrive.benchmark.report.figures import errors_figure, map_figure, speed_figure, success_figure
+from caldrive.benchmark.report.figures import errors_figure, speed_figure, success_figure
+from caldrive.benchmark.report.maps import maps
 from caldrive.benchmark.report.runs import BenchmarkRun, Failure, Table, failures
 from caldrive.benchmark.report.tables import counted, headline, tables
 from caldrive.formats import markdown_table
 
+PAGE_BYTES = 2_990_000  # that the pictures of failures fill up: a page is to stay below 3 MB
 _DATA = Path(__file__).parent
 FAILURE_HEAD = ("agent", "episode", "outcome", "how it began", "infractions", "wrong in the 3 s before")
 
 
 def report_page(runs: Sequence[BenchmarkRun]) -> str:
-    """The whole HTML page."""
-    style, script = ((_DATA / name).read_text() for name in ("report.css", "report.js"))
+    """The whole HTML page, with pictures of as many failures as its size allows."""
     first_table, success, *other_tables = tables(runs)
     first_figure, *other_figures = _figures(runs)
     body = [
         _table(first_table), _table(success), first_figure, *map(_table, other_tables), *other_figures,
-        failures_section(runs),
     ]  # fmt: skip
+    bare = _page(runs, [*body, failures_section(runs, 0)])
+    return _page(runs, [*body, failures_section(runs, PAGE_BYTES - len(bare.encode()))])
+
+
+def _page(runs: Sequence[BenchmarkRun], body: Sequence[str]) -> str:
+    """A page of some sections."""
+    style, script = ((_DATA / name).read_text() for name in ("report.css", "report.js"))
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>caldrive benchmark</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -37,10 +44,9 @@ def report_page(runs: Sequence[BenchmarkRun]) -> str:
 
 def _figures(runs: Sequence[BenchmarkRun]) -> list[str]:
     """A section for each figure, without those of which nothing is known."""
-    towns = dict.fromkeys(result.trial.scenario.town for run in runs for result in run.results)
     figures = {
         "Success, with the paper's systems": success_figure(runs),
-        "Where rules were broken": "".join(map_figure(runs, town) for town in towns),
+        "Where things went wrong": maps(runs),
         "Errors of the affordances over time": errors_figure(runs),
         "Speed over distance": speed_figure(runs),
     }

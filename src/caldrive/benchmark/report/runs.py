@@ -48,8 +48,10 @@ class Explanation:
 
     blame: str = ""
     """What the failure comes from, in words."""
+    counted: str = ""
+    """The one name under which it is counted."""
     blamed: tuple[str, ...] = ()
-    """The same as names: each of them alone is to blame."""
+    """The same as names: the truth of each of them rescues the episode."""
     alone: tuple[str, ...] = ()
     """The affordances that spoil the episode when they alone are seen."""
     moments: tuple[FailureMoment, ...] = ()

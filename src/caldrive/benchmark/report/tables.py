@@ -202,13 +202,17 @@ def _blame(runs: Sequence[BenchmarkRun]) -> Table:
     rows = []
     for run in runs:
         known = [failure.explanation for failure in run.failures if failure.explanation.blame]
+        counts = Counter(why.counted for why in known)
         blamed = Counter(name for why in known for name in why.blamed)
         alone = Counter(name for why in known for name in why.alone)
-        for name in dict.fromkeys([*(spec.title for spec in SPECS), *blamed]) if known else ():
-            rows.append((run.name, name, f"{blamed[name]} of {len(known)}", str(alone[name])))
+        titles = [spec.title for spec in SPECS]
+        for name in dict.fromkeys([*titles, *counts]) if known else ():
+            more = (str(blamed[name]), str(alone[name])) if name in titles else ("", "")
+            rows.append((run.name, name, f"{counts[name]} of {len(known)}", *more))
     text = (
-        "How many failures each affordance is to blame for: they go well once its truth is told; and how many go wrong "
-        "when it alone is seen and all others are told. A failure can have several, each of which rescues it."
+        "What failures come from, each counted once: an affordance alone is to blame where its truth rescues the "
+        "episode, and no other's does. Beside that how many its truth rescues in all, and how many go wrong when it "
+        "alone is seen and all others are told."
     )
-    head = ("agent", "to blame", "failures", "fail with it alone seen")
+    head = ("agent", "to blame", "failures", "rescued by its truth", "fail with it alone seen")
     return Table(title="Blame", text=text, head=head, rows=tuple(rows))
