@@ -46,7 +46,7 @@ def maps(runs: Sequence[BenchmarkRun]) -> str:
     if not shown:
         return ""
     figures = "".join(map_figure([run.name for run in runs], town, places[town]) for town in shown)
-    return f"<p>{escape(_said(len(towns), list(places), shown))}</p>{figures}"
+    return f'<p>{escape(_said(len(towns), list(places), shown))}</p><div class="maps">{figures}</div>'
 
 
 def _much(places: Places) -> tuple[int, int]:
