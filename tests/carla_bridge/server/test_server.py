@@ -109,6 +109,14 @@ def test_whoever_comes_alone_finds_the_same_world_byte_for_byte(server: Server) 
     assert run_of_20_ticks(server) == run_of_20_ticks(server)
 
 
+def test_the_first_program_after_the_start_finds_the_same_world_as_the_second() -> None:
+    fresh = make_server(ServerSettings(town="town01", port=free_port(), cars=2, people=3))
+    fresh.warm_up()
+    first, second = run_of_20_ticks(fresh), run_of_20_ticks(fresh)
+    fresh.close()
+    assert first == second
+
+
 def test_who_subscribes_already_hears_of_a_new_episode_with_its_first_step(client: WireClient) -> None:
     reader = Reader(client, WORLD)
     old = episode_of(reader.message())

@@ -107,7 +107,13 @@ class Server:
         """Does once what clients would have to wait for the first time; then all is as it was."""
         self.episode.step(FREE_STEP)
         self._senses.warm_up(self.episode)
-        self.begin()
+        self._start_over()
+
+    def _start_over(self) -> None:
+        """All is as the first client finds it, to its numbers."""
+        self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
+        self._rules.clear()
+        self._begin_again(self.settings.town)
         self._pace.begin()
 
     def run(self) -> None:
@@ -176,11 +182,8 @@ class Server:
         if client in self._rules:
             del self._rules[client]
             self._pace.go_on()
-        if not self.clients:  # who comes next finds what the first one found
-            self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
-            self._rules.clear()
-            self._begin_again(self.settings.town)
-            self._pace.begin()
+        if not self.clients:
+            self._start_over()
             return
         for actor in self.episode.all(Actor):
             if actor.owner == client and self.episode.get(actor.id) is actor:
