@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +18,9 @@ from typing import Any
 
 import pytest
 
+from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.carla_bridge.server.streams import Subscriber
+from caldrive.commands.serve_carla import make_server
 from tests.carla_bridge.server.wire_client import free_port
 
 PORT, MANAGER = free_port(), free_port()
@@ -51,9 +55,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Pope
 
 
 @contextmanager
-def start(program: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def start(program: str, *arguments: str, port: int = PORT) -> Iterator[subprocess.Popen[str]]:
     """A program as a process, which ends with the block."""
-    command = [sys.executable, "-m", f"tests.carla_bridge.server.programs.{program}", str(PORT), *arguments]
+    command = [sys.executable, "-m", f"tests.carla_bridge.server.programs.{program}", str(port), *arguments]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, env=environment(), cwd=ROOT, stdout=pipe, stderr=pipe, text=True) as process:
         try:
@@ -119,6 +123,23 @@ def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server
             time.sleep(0.03 * k)
             process.kill()
     assert run("cameras")["moved"] > 1.0
+
+
+def test_a_client_whose_sensors_have_ended_does_not_connect_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    connections: list[int] = []
+    counted = Subscriber.__init__
+
+    def counting(one: Subscriber, connection: socket.socket) -> None:
+        connections.append(1)
+        counted(one, connection)
+
+    monkeypatch.setattr(Subscriber, "__init__", counting)
+    with closing(make_server(ServerSettings(town="town01", port=free_port()))) as near:
+        with start("orphans", port=near.settings.port) as process:
+            while process.poll() is None:
+                near.turn(0.05)
+            assert process.returncode == 0, process.communicate()[1]
+    assert len(connections) == 4  # of the world and three sensors
 
 
 def test_a_client_whose_server_is_killed_is_told_so(server: subprocess.Popen[bytes]) -> None:  # the last test

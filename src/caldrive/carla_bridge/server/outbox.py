@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import socket
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from typing import Any
 
-Log = Callable[[str], None]
 AT_ONCE = 16  # pieces that are handed to the system together
 
 

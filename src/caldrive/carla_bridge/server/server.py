@@ -7,9 +7,8 @@ world stands at its beginning, so that a program that comes alone finds the same
 from __future__ import annotations
 
 import selectors
-import sys
 from collections.abc import Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from caldrive.carla_bridge.server.calls import Call, serve, turned_down
 from caldrive.carla_bridge.server.clients import Clients
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
+from caldrive.carla_bridge.server.log import Log
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
@@ -41,6 +41,7 @@ class Server:
 
     def __init__(self, settings: ServerSettings, recording: RunRecording | None = None) -> None:
         self.settings, self.maps, self._recording = settings, Maps(settings.maps), recording
+        self.log = Log()
         self._rules: dict[int, Settings] = {}  # of the clients that set some, the latest last
         self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
         self.managers: dict[int, tuple[str, int]] = {}
@@ -63,11 +64,6 @@ class Server:
             self._latest = self.episode.snapshot(self.frame)
             self.close = stack.pop_all().close
             """Ends it all."""
-
-    def log(self, sentence: str) -> None:
-        """Says something on stderr, if anybody can hear it."""
-        with suppress(OSError, ValueError):
-            print(f"caldrive: {sentence}", file=sys.stderr, flush=True)
 
     def _begin(self, town_name: str) -> Episode:
         """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
