@@ -134,11 +134,11 @@ def test_a_client_whose_sensors_have_ended_does_not_connect_again_and_again(monk
         counted(one, connection)
 
     monkeypatch.setattr(Subscriber, "__init__", counting)
-    with closing(make_server(ServerSettings(town="town01", port=free_port()))) as near:
-        with start("orphans", port=near.settings.port) as process:
-            while process.poll() is None:
-                near.turn(0.05)
-            assert process.returncode == 0, process.communicate()[1]
+    near = make_server(ServerSettings(town="town01", port=free_port()))
+    with closing(near), start("orphans", port=near.settings.port) as process:
+        while process.poll() is None:
+            near.turn(0.05)
+        assert process.returncode == 0, process.communicate()[1]
     assert len(connections) == 4  # of the world and three sensors
 
 

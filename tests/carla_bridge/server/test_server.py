@@ -153,6 +153,21 @@ def test_a_call_that_nobody_knows_is_refused_and_the_next_one_served(client: Wir
     assert client.call("version") == "0.9.16"
 
 
+def test_what_is_refused_to_a_client_that_does_not_listen_is_said_once(
+    server: Server, client: WireClient, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(3):
+        client.tell("apply_control_to_vehicle", 10**6, control())
+        client.tell("apply_batch", [[[1, [10**6]]], [[2, [10**6, control()]]]], False)
+        client.tell("set_actor_location", client.server.episode.spectator.id, [1.0, 2.0, 3.0])
+    with pytest.raises(RefusedError):
+        client.call("apply_ackermann_control_to_vehicle", 10**6, [0.0, 0.0, 3.0, 0.0, 0.0])  # it hears it itself
+    said = capsys.readouterr().err
+    assert said.count("was refused") == 2
+    assert "apply_control_to_vehicle of a client was refused" in said
+    assert "caldrive: apply_batch of a client was refused" in said
+
+
 def test_a_light_shows_what_a_client_wants_until_its_time_is_over(server: Server, client: WireClient) -> None:
     light = server.episode.lights.actors[0]
     client.call("set_traffic_light_green_time", light.id, 1.0)

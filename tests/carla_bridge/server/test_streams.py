@@ -25,8 +25,6 @@ class Said(Log, list[str]):
     def __call__(self, sentence: str) -> None:
         self.append(sentence)
 
-    __hash__ = object.__hash__
-
 
 @pytest.fixture
 def said() -> Said:
@@ -78,9 +76,7 @@ def test_nobody_waits_for_those_who_were_announced_to_a_stream_that_has_ended(st
     assert time.monotonic() - begin < 0.1
 
 
-def test_who_does_not_read_misses_messages_and_is_cut_off(
-    streams: Streams, reader: socket.socket, said: Said
-) -> None:
+def test_who_does_not_read_misses_messages_and_is_cut_off(streams: Streams, reader: socket.socket, said: Said) -> None:
     for _ in range(40):
         streams.send(STREAM, [MEGABYTE])  # does not wait
     assert len(said) == 1
@@ -94,9 +90,7 @@ def test_who_does_not_read_misses_messages_and_is_cut_off(
     assert "cut off" in said[-1]
 
 
-def test_whoever_reads_all_that_waited_gets_messages_again(
-    streams: Streams, reader: socket.socket, said: Said
-) -> None:
+def test_whoever_reads_all_that_waited_gets_messages_again(streams: Streams, reader: socket.socket, said: Said) -> None:
     for _ in range(40):
         streams.send(STREAM, [MEGABYTE])
     reader.settimeout(0.05)

@@ -21,6 +21,7 @@ from caldrive.carla_bridge.server.log import Log
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
+from caldrive.carla_bridge.server.refusals import Refusals
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
@@ -42,6 +43,7 @@ class Server:
     def __init__(self, settings: ServerSettings, recording: RunRecording | None = None) -> None:
         self.settings, self.maps, self._recording = settings, Maps(settings.maps), recording
         self.log = Log()
+        self._refusals = Refusals(self.log)
         self._rules: dict[int, Settings] = {}  # of the clients that set some, the latest last
         self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
         self.managers: dict[int, tuple[str, int]] = {}
@@ -160,6 +162,7 @@ class Server:
             self._pace.hear()
         try:
             result = serve(self.calls, caller, request)
+            self._refusals.note(caller, request, result)
         except Exception as error:  # the last door before everybody's world
             self.log(f"found a fault of the program in {request.method} ({type(error).__name__}: {error}), wanted none")
             return turned_down(
@@ -172,6 +175,7 @@ class Server:
 
     def _forget(self, client: int) -> None:
         """A client has gone, and what was its own goes with it."""
+        self._refusals.forget(client)
         self.managers = {port: row for port, row in self.managers.items() if row[1] != client}
         if self.settings.keep:
             return
