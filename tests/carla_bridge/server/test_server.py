@@ -352,6 +352,21 @@ def test_a_vehicle_that_hits_a_standing_one_says_so(client: WireClient) -> None:
     assert sum(part**2 for part in impulse) > 1000.0**2
 
 
+def test_somebody_who_is_run_into_says_so_too(server: Server, client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    car = client.spawn("vehicle.tesla.model3", (x, y, yaw))
+    walker = client.spawn("walker.pedestrian.0001", (x + 5 * c, y + 5 * s, yaw))
+    readers = [Reader(client, attached(client, "sensor.other.collision", one) + 1) for one in (car, walker)]
+    client.call("set_actor_target_velocity", car, [10.0 * c, 10.0 * s, 0.0])
+    while not server.episode.hits:
+        client.call("tick_cue")
+    (own, other, back), (struck, by, forth) = (msgpack.unpackb(reader.message()[48:]) for reader in readers)
+    assert (own[0], other[0], struck[0], by[0]) == (car, walker, walker, car)
+    assert back[0] * c + back[1] * s < -100.0  # N s
+    assert forth == pytest.approx([-part for part in back])
+
+
 def test_who_is_spawned_before_the_first_step_is_in_the_next_frame(server: Server) -> None:
     free = WireClient(server)
     reader = Reader(free, WORLD)

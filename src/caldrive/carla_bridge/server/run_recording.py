@@ -60,7 +60,7 @@ class RunRecording:
             yield "/lights", lights_scene(lights)
         for text in self._changes(episode):
             yield "/log", Remark("info", text)
-        for vehicle, contact in episode.hits:
+        for vehicle, contact, _ in episode.hits:
             yield "/log", Remark("warning", f"{name(vehicle)} hits {contact.id} with {contact.impulse:.0f} kg m/s")
 
     def _changes(self, episode: Episode) -> Iterator[str]:
