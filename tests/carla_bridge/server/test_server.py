@@ -7,6 +7,7 @@ import re
 import socket
 import struct
 from collections.abc import Iterator
+from pathlib import Path
 
 import msgpack
 import numpy as np
@@ -16,12 +17,15 @@ from caldrive.carla_bridge.axes import compose
 from caldrive.carla_bridge.server import clients
 from caldrive.carla_bridge.server.actors import Actor
 from caldrive.carla_bridge.server.layouts import Transform, placement
+from caldrive.carla_bridge.server.maps import Maps
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.carla_bridge.server.wire import Request
 from caldrive.commands.serve_carla import make_server
 from caldrive.datatypes import LightState
+from caldrive.world.roads.towns import load_roads
+from caldrive.world.traffic.sidewalks import room
 from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, free_port, positions
 
 PORT = free_port()
@@ -134,6 +138,36 @@ def test_who_subscribes_already_hears_of_a_new_episode_with_its_first_step(clien
 def episode_of(snapshot: bytes) -> int:
     number: int = struct.unpack_from("<Q", snapshot, 48)[0]
     return number
+
+
+def test_a_world_that_cannot_be_loaded_costs_nobody_anything(
+    server: Server, client: WireClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "Odd.xodr").write_text("<OpenDRIVE/>")
+    other = WireClient(server)
+    car, episode = other.spawn("vehicle.tesla.model3", place(client, 0)), server.episode
+    reader = Reader(other, attached(other, "sensor.other.gnss", car) + 1)
+    monkeypatch.setattr(server, "maps", Maps(tmp_path))
+    for name in ("Nowhere", "Carla/Maps/Odd", "random:x", "random:-1", "random:" + 40 * "9"):
+        with pytest.raises(RefusedError, match=r"^found .*wanted"):
+            client.call("load_new_episode", name, True, 0)
+    assert client.call("get_episode_settings")[0] is True
+    client.call("tick_cue")
+    assert struct.unpack_from("<8xQ", reader.message()) == (server.frame,)
+    assert server.episode is episode
+    assert client.call("get_actors_by_id", [car])
+    other.leave()
+
+
+def test_a_town_without_room_for_all_who_live_there_costs_nobody_anything() -> None:
+    full = make_server(ServerSettings(town="town01", port=free_port(), people=room(load_roads("town02")) + 1))
+    client = WireClient(full)
+    episode = full.episode
+    with pytest.raises(RefusedError, match=r"town02 has room for \d+: ask for fewer with --people"):
+        client.call("load_new_episode", "town02", False, 0)
+    assert full.episode is episode
+    client.leave()
+    full.close()
 
 
 @pytest.mark.parametrize("bytes_", [b"\xc1", b"\x91" * 5000, msgpack.packb([7]), msgpack.packb({}), bytes(range(256))])

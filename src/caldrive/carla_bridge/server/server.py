@@ -21,13 +21,14 @@ from caldrive.carla_bridge.server.log import Log
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
+from caldrive.carla_bridge.server.population import require_room
 from caldrive.carla_bridge.server.refusals import Refusals
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
 from caldrive.carla_bridge.server.wire import Request
-from caldrive.world.town import load_town
+from caldrive.world.town import Town, load_town
 
 if TYPE_CHECKING:  # it needs what draws
     from caldrive.carla_bridge.server.run_recording import RunRecording
@@ -59,42 +60,50 @@ class Server:
             self._selector = stack.enter_context(selectors.DefaultSelector())
             for one in (self.clients, self.streams):
                 self._selector.register(one, selectors.EVENT_READ, one.poll)
-            self._senses = Senses(load_town(settings.town))
+            town = self._suitable(settings.town)
+            self._senses = Senses(town)
             stack.callback(lambda: self._senses.close())
-            self.episode = self._begin(settings.town)
+            self.episode = self._begin(town)
             stack.callback(lambda: self.episode.close())
             self._latest = self.episode.snapshot(self.frame)
             self.close = stack.pop_all().close
             """Ends it all."""
 
-    def _begin(self, town_name: str) -> Episode:
-        """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
-        town = load_town(town_name)
+    def _suitable(self, name: str) -> Town:
+        """A town with room for an episode. Raises ValueError, OSError or RuntimeError where there is none."""
+        town = load_town(name)
         if town.roads.offset != (0.0, 0.0):
             raise ValueError(
-                f"found that {town_name} lies far from the origin of its map, wanted one within 5 km: move the map"
+                f"found that {name} lies far from the origin of its map, wanted one within 5 km: move the map"
             )
+        require_room(town.roads, self.settings.cars, self.settings.people)
+        signal_ids(name, town.roads)  # what cannot be read is found here
+        return town
+
+    def _begin(self, town: Town) -> Episode:
+        """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
         self._episodes += 1
-        episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads), self._numbers)
+        episode = Episode(self._episodes, town, self.settings, signal_ids(town.name, town.roads), self._numbers)
         if self._senses.town is not town:
             self._senses.close()
             self._senses = Senses(town)
         return episode
 
-    def begin(self, town: str | None = None) -> None:
+    def begin(self, name: str | None = None) -> None:
         """Ends the episode and begins another, in the same town or another. Raises ValueError, OSError or RuntimeError
-        where there cannot be one; then the old town begins again.
+        where there cannot be one: a town that does not suit costs nothing, and one in which nothing moves is left for
+        the old one, which begins again.
 
         Who subscribes already hears of it with the next step, which the clock makes after a while: a client that loads
         a world leaves its old subscription, and crashes where something comes in on it at that moment."""
-        old = self.episode.town.name
-        load_town(town or old)  # a map that cannot be read costs nothing
+        old = self.episode.town
+        town = self._suitable(name) if name else old
         for actor in self.sensors():
             self.streams.close_stream(actor.stream)
         self.episode.close()
         self._pace.begin_loaded()
         try:
-            self.episode = self._begin(town or old)
+            self.episode = self._begin(town)
         except (ValueError, OSError, RuntimeError):
             self.episode = self._begin(old)
             raise
