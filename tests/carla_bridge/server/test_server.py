@@ -412,16 +412,31 @@ def test_who_is_spawned_before_the_first_step_is_in_the_next_frame(server: Serve
     free.leave()
 
 
-def test_what_is_put_aside_far_below_the_ground_meets_nobody(server: Server, client: WireClient) -> None:
+@pytest.mark.parametrize("has_physics", [True, False])
+def test_what_is_put_aside_far_below_the_ground_is_nowhere_until_it_is_needed(
+    server: Server, client: WireClient, has_physics: bool
+) -> None:
     x, y, yaw = place(client, 0)
     client.spawn("vehicle.tesla.model3", (x, y, yaw))
     aside = [[x, y, -500.0], [0.0, yaw, 0.0]]
     parked, *_ = client.call("spawn_actor", [1, "vehicle.audi.tt", []], aside)
-    client.call("set_actor_simulate_physics", parked, False)
+    client.call("set_actor_simulate_physics", parked, has_physics)
+    client.call("apply_control_to_vehicle", parked, control(throttle=1.0))
+    walker, *_ = client.call("spawn_actor", [1, "walker.pedestrian.0001", []], aside)
     client.call("spawn_actor", [1, "static.prop.container", []], aside)
-    client.call("tick_cue")
+    for _ in range(5):
+        client.call("tick_cue")
     assert not server.episode.hits
     assert (len(server.episode.bodies()), server.episode.props()) == (1, [])
+    for number in (parked, walker):
+        actor = server.episode.get(number)
+        assert actor is not None
+        assert (actor.place.x, actor.place.y, actor.place.z) == pytest.approx((x, -y, -500.0))
+    x, y, yaw = place(client, 2)
+    client.call("set_actor_transform", parked, [[x, y, 0.3], [0.0, yaw, 0.0]])
+    client.call("set_actor_transform", walker, [[x, y + 5.0, 1.0], [0.0, yaw, 0.0]])
+    client.call("tick_cue")
+    assert len(server.episode.bodies()) == 3
 
 
 def test_a_sensor_that_speaks_now_and_then_keeps_its_distance(server: Server, client: WireClient) -> None:

@@ -10,7 +10,7 @@ import shapely
 
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server import snapshot
-from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description
+from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description, is_on_ground
 from caldrive.carla_bridge.server.blueprints import N_WALKERS, usual_attributes
 from caldrive.carla_bridge.server.contacts import Hit, is_free, resolve_contacts
 from caldrive.carla_bridge.server.friction import FrictionVolume, friction_at
@@ -33,7 +33,6 @@ from caldrive.world.town import Town
 LOOK_AT_LIMITS = 10  # steps from one look at the limit under a vehicle to the next
 NATIVE_CARS = {4.2: "vehicle.seat.leon", 4.6: "vehicle.tesla.model3", 4.9: "vehicle.volkswagen.t2"}  # by their length
 NATIVE_HEIGHT = 1.5  # m
-OFF_GROUND = 5.0  # m above or below the ground, from which on nothing is met
 PERSON_BOX = BoundingBox(Vector(), Vector(RADIUS, RADIUS, HEIGHT / 2))
 Kind = TypeVar("Kind", bound=Actor)
 
@@ -121,7 +120,7 @@ class Episode:
             vehicle.step(delta)
         for walker in walkers:
             walker.step(delta)
-        self._population.move_to(self.time, self._vehicle_states(), self._walker_states())
+        self._population.move_to(self.time, self.vehicle_states(), self.walker_states())
         self._take_down()
         there = [one for one in vehicles if is_on_ground(one.place)]
         self.hits = resolve_contacts(there, self.bodies(), self.props(), self.town.obstacles)
@@ -147,7 +146,7 @@ class Episode:
         for k, person in enumerate(self.people):
             actor = self._native(person, f"walker.pedestrian.{1 + k % N_WALKERS:04}")
             actor.own_place = standing(person.pose, UP)
-        there = [*self.cars, *(one.box_state() for one in self.all(Vehicle))]
+        there = [*self.cars, *self.vehicle_states()]
         ids = [actor.id for actor in map(self.actor_of, (car.id for car in there)) if actor]
         self._at_light = dict(zip(ids, self.lights.before([car.pose for car in there]), strict=True))
 
@@ -166,14 +165,16 @@ class Episode:
         actor.motion = (vector_to_carla(body.speed * c, body.speed * s), NOTHING, NOTHING)
         return actor
 
-    def _walker_states(self) -> list[PedestrianState]:
+    def walker_states(self) -> list[PedestrianState]:
+        """The clients' walkers, as the embedded world knows people."""
         return [
             one.state(bool(shapely.contains_xy(self.town.roads.roadway, one.own_place.x, one.own_place.y)))
             for one in self.all(Walker)
             if is_on_ground(one.own_place)
         ]
 
-    def _vehicle_states(self, but: int = 0) -> list[VehicleState]:
+    def vehicle_states(self, but: int = 0) -> list[VehicleState]:
+        """Likewise their vehicles, but one."""
         return [one.box_state() for one in self.all(Vehicle) if one.id != but and is_on_ground(one.place)]
 
     def props(self) -> list[Prop]:
@@ -182,14 +183,14 @@ class Episode:
 
     def bodies(self) -> list[VehicleState | PedestrianState]:
         """Everybody who moves."""
-        return [*self.cars, *self.people, *self._vehicle_states(), *self._walker_states()]
+        return [*self.cars, *self.people, *self.vehicle_states(), *self.walker_states()]
 
     def scene(self, camera: Placement, carrier: Actor | None) -> SceneState:
         """What a camera may see; not the vehicle that carries it, where the camera is inside its box."""
         own = carrier.id if isinstance(carrier, Vehicle) and _is_inside(carrier, camera) else 0
-        here, vehicles = VehicleState(camera.pose), [*self.cars, *self._vehicle_states(but=own)]
+        here, vehicles = VehicleState(camera.pose), [*self.cars, *self.vehicle_states(but=own)]
         lights = {one.post.id: one.state for one in self.lights.actors}
-        people = [*self.people, *self._walker_states()]
+        people = [*self.people, *self.walker_states()]
         return SceneState(self.drawn_weather, here, vehicles, people, lights, self.time)
 
     def snapshot(self, frame: int) -> bytes:
@@ -230,11 +231,6 @@ class Episode:
     def close(self) -> None:
         """Ends the traffic."""
         self._population.close()
-
-
-def is_on_ground(place: Placement) -> bool:
-    """Whether something meets what is in the town: programs put aside far below or above it what they need later."""
-    return abs(place.z) < OFF_GROUND
 
 
 def _is_inside(vehicle: Vehicle, camera: Placement) -> bool:

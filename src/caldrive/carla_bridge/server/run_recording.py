@@ -8,8 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from caldrive.carla_bridge.server.actors import NOBODY, Actor
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
-from caldrive.carla_bridge.server.vehicles import Vehicle
-from caldrive.carla_bridge.server.walkers import Walker
 from caldrive.datatypes import LightState
 from caldrive.visualization.channels import Content, Picture, Remark, Writer, as_jpeg
 from caldrive.visualization.scenes import lights_scene, others_scene, town_scene
@@ -50,9 +48,8 @@ class RunRecording:
 
     def _messages(self, episode: Episode) -> Iterator[tuple[str, Content]]:
         """What a step says."""
-        vehicles, walkers = episode.all(Vehicle), episode.all(Walker)
         yield "/inhabitants", others_scene(episode.cars, episode.people)
-        yield "/clients", others_scene((one.box_state() for one in vehicles), (one.state(False) for one in walkers))
+        yield "/clients", others_scene(episode.vehicle_states(), episode.walker_states())
         lights = episode.lights.shown()
         states = [(light.id, light.state) for light in lights]
         if states != self._lights:  # they rarely change

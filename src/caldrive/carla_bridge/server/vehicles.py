@@ -57,9 +57,9 @@ class Vehicle(Actor):
 
     @property
     def place(self) -> Placement:
-        """Where it is; what has no physics may hover."""
-        pose, own = self.state.pose, self.own_place
-        return standing(pose) if self.has_physics else replace(own, x=pose.x, y=pose.y, heading=pose.heading)
+        """Where it is; what has no physics may hover, and what is below the ground stays there."""
+        pose, own, is_held = self.state.pose, self.own_place, self.is_aside or not self.has_physics
+        return replace(own, x=pose.x, y=pose.y, heading=pose.heading) if is_held else standing(pose)
 
     def put(self, place: Placement) -> None:
         """It is at a place from now on, and keeps its speed."""
@@ -75,7 +75,7 @@ class Vehicle(Actor):
     def step(self, dt: float) -> None:
         """Drives on for dt seconds."""
         before = self.state
-        if not self.has_physics:
+        if self.is_aside or not self.has_physics:
             self.state, self.motion = replace(before, speed=0.0, acceleration=0.0), STILL
             return
         if self.ackermann is not None:
