@@ -23,7 +23,7 @@ from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
 from caldrive.carla_bridge.server.population import require_room
 from caldrive.carla_bridge.server.refusals import Refusals
-from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
+from caldrive.carla_bridge.server.sensor_actors import SensorActor
 from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
@@ -236,18 +236,9 @@ class Server:
                 for message in self._senses.heard(sensor, self.episode, self.frame, self.log):
                     self.streams.send(sensor.stream, message)
                     heard.append((sensor, message))
-        self._record(heard)
+        if self._recording is not None:
+            self._recording.step(self.episode, heard, self.log)
         return self.frame
-
-    def _record(self, heard: Sequence[tuple[SensorActor, Message]]) -> None:
-        """Takes down the last step. A full disk ends the recording, and not the server."""
-        if self._recording is None:
-            return
-        try:
-            self._recording.step(self.episode, heard)
-        except OSError as error:
-            self.log(f"found that {self.settings.record} cannot be written ({error.strerror}), wanted room: it ends")
-            self._recording = None
 
     def _show(self) -> None:
         """Tells everybody who is where now: a frame."""
