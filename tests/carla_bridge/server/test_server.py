@@ -24,6 +24,7 @@ from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.carla_bridge.server.wire import Request
 from caldrive.commands.serve_carla import make_server
 from caldrive.datatypes import LightState
+from caldrive.geometry import moved
 from caldrive.world.roads.towns import load_roads
 from caldrive.world.traffic.sidewalks import room
 from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, free_port, positions
@@ -222,15 +223,14 @@ def test_a_light_that_is_given_a_time_after_its_state_keeps_it_for_so_long(serve
     assert light.state is LightState.GREEN
 
 
-def test_a_light_that_is_switched_off_leaves_the_others_of_its_junction_alone(
-    server: Server, client: WireClient
-) -> None:
-    first, second, *_ = server.episode.lights.of_junction(server.episode.lights.actors[0])
-    for light in (first, second):
-        client.call("set_traffic_light_state", light.id, 2)
-    client.call("set_traffic_light_state", first.id, 3)
-    assert (first.held, second.state) == (None, LightState.GREEN)
-    assert second.held is not None
+@pytest.mark.parametrize("state", [3, 4, -1])
+def test_a_light_is_not_switched_off_and_shows_what_it_showed(server: Server, client: WireClient, state: int) -> None:
+    light = server.episode.lights.actors[0]
+    client.call("set_traffic_light_state", light.id, 2)
+    with pytest.raises(RefusedError, match="wanted Red, Yellow or Green"):
+        client.call("set_traffic_light_state", light.id, state)
+    assert light.state is LightState.GREEN
+    assert light.held is not None
 
 
 def test_every_sign_and_light_has_its_id_on_the_map(server: Server, client: WireClient) -> None:
@@ -271,6 +271,22 @@ def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient)
         client.call("tick_cue")
         seen.append(positions(reader.message())[car])
     assert seen[0] != seen[-1]
+
+
+def test_what_follows_a_spawn_is_attached_to_it(server: Server, client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+
+    def spawn(kind: str, parent: list[object], at: object, *then: object) -> list[object]:
+        return [[0, [[1, kind, []], at, parent, 0, "", [*then]]]]
+
+    camera = spawn("sensor.other.gnss", [True, 0], [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0]])
+    car = spawn("vehicle.audi.tt", [False], [[x, y, 0.3], [0.0, yaw, 0.0]], camera)
+    [[[done, number]], [[failed, [text]]]] = client.call("apply_batch", [car, camera], False)
+    [sensor] = server.sensors()
+    assert sensor.parent is not None
+    assert (done, sensor.parent.id) == (1, number)
+    assert failed == 0
+    assert "FutureActor" in text
 
 
 @pytest.mark.parametrize("fixed_delta", [[], [True], [True, 20.0], [True, -0.1], [2, -5.0], [True, float("nan")]])
@@ -451,6 +467,40 @@ def test_a_sensor_that_speaks_now_and_then_keeps_its_distance(server: Server, cl
     for _ in range(3):
         spoken.append(struct.unpack_from("<16xd", reader.message())[0])
     assert np.diff(spoken) == pytest.approx([0.5, 0.5])
+
+
+def test_gravity_is_what_imus_feel(client: WireClient) -> None:
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
+    reader = Reader(client, attached(client, "sensor.other.imu", car) + 1)
+    client.call("set_imui_gravity", 1.62)
+    assert client.call("get_imui_gravity") == 1.62
+    client.call("tick_cue")
+    acceleration, *_ = msgpack.unpackb(reader.message()[48:])
+    assert acceleration[2] == pytest.approx(1.62)
+
+
+def test_cars_of_the_town_are_told_the_limit_of_their_lane() -> None:
+    served = make_server(ServerSettings(town="town01", port=free_port(), cars=20))
+    roads, lawful = served.episode.town.roads, {}
+    for car in served.episode.cars:
+        actor = served.episode.actor_of(car.id)
+        assert actor is not None
+        lawful[actor.id] = roads.lane_at(car.pose)[0].limit
+    rows = served._latest[48 + 36 :]
+    told = {
+        struct.unpack_from("<I", rows, k)[0]: struct.unpack_from("<f", rows, k + 65 + 19)[0]
+        for k in range(0, len(rows), 119)
+    }
+    served.close()
+    assert len(set(lawful.values())) > 1
+    assert {number: told[number] for number in lawful} == pytest.approx(lawful)
+
+
+def test_a_ray_tells_the_road_from_the_sidewalk_and_what_is_beyond(server: Server, client: WireClient) -> None:
+    lane = max(server.episode.town.roads.driveable, key=lambda lane: lane.line.length)
+    beside = [moved(lane.line.pose_at(lane.line.length / 2), left=left) for left in (0.0, -4.0, -8.0)]
+    rays = [([pose.x, -pose.y, 1.0], [pose.x, -pose.y, -1.0]) for pose in beside]
+    assert [client.call("cast_ray", *ray)[0][1] for ray in rays] == [1, 2, 10]
 
 
 def test_a_refused_batch_has_the_form_of_a_list(client: WireClient) -> None:

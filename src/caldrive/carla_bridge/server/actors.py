@@ -109,5 +109,13 @@ def description(id: str, **attributes: str) -> ActorDescription:
 
 
 @dataclass(eq=False)
+class NativeCar(Actor):
+    """A car of the town's own, which SUMO drives."""
+
+    limit: float = 30.0
+    """km/h, the lawful one where it is."""
+
+
+@dataclass(eq=False)
 class Prop(Actor):
     """A thing that a client put somewhere: it can be hit, and is not drawn."""

@@ -10,7 +10,7 @@ import shapely
 
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server import snapshot
-from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description, is_on_ground
+from caldrive.carla_bridge.server.actors import Actor, NativeCar, Prop, box_of, description, is_on_ground
 from caldrive.carla_bridge.server.blueprints import N_WALKERS, usual_attributes
 from caldrive.carla_bridge.server.contacts import Hit, is_free, resolve_contacts
 from caldrive.carla_bridge.server.friction import FrictionVolume, friction_at
@@ -33,6 +33,7 @@ from caldrive.world.town import Town
 LOOK_AT_LIMITS = 10  # steps from one look at the limit under a vehicle to the next
 NATIVE_CARS = {4.2: "vehicle.seat.leon", 4.6: "vehicle.tesla.model3", 4.9: "vehicle.volkswagen.t2"}  # by their length
 NATIVE_HEIGHT = 1.5  # m
+GRAVITY = 9.81  # m/s²
 PERSON_BOX = BoundingBox(Vector(), Vector(RADIUS, RADIUS, HEIGHT / 2))
 Kind = TypeVar("Kind", bound=Actor)
 
@@ -46,6 +47,8 @@ class Episode:
     ) -> None:
         self.number, self.town, self.time, self.delta = number, town, 0.0, 0.0
         self.hits: list[Hit] = []
+        self.gravity = GRAVITY
+        """m/s² that IMUs feel."""
         self.has_changed = False
         """Whether actors came or went since the last snapshot."""
         self._steps, self._numbers = 0, numbers
@@ -127,14 +130,15 @@ class Episode:
         for vehicle, state in zip(vehicles, before, strict=True):
             vehicle.note_motion(state, delta)
         if self._steps % LOOK_AT_LIMITS == 1:
-            for vehicle in vehicles:
-                vehicle.limit = self._limit_at(vehicle)
+            known: list[Vehicle | NativeCar] = [*vehicles, *self.all(NativeCar)]
+            for one in known:
+                one.limit = self._limit_at(one)
 
-    def _limit_at(self, vehicle: Vehicle) -> float:
+    def _limit_at(self, one: Vehicle | NativeCar) -> float:
         try:
-            return self.town.roads.lane_at(vehicle.state.pose)[0].limit
+            return self.town.roads.lane_at(one.place.pose)[0].limit
         except ValueError:  # beside the road the last one goes on
-            return vehicle.limit
+            return one.limit
 
     def _take_down(self) -> None:
         """Takes down who is where now."""
@@ -153,11 +157,12 @@ class Episode:
     def _native(self, body: VehicleState | PedestrianState, kind: str) -> Actor:
         """The actor of one of the inhabitants, as it moves now."""
         if body.id not in self._natives:
-            box = PERSON_BOX
+            about = description(kind, **usual_attributes(kind) | {"role_name": "autopilot"})
+            actor = Actor(next(self._numbers), about, standing(body.pose), box=PERSON_BOX)
             if isinstance(body, VehicleState):
                 box = box_of((body.length, body.width, NATIVE_HEIGHT), NATIVE_HEIGHT / 2)
-            about = description(kind, **usual_attributes(kind) | {"role_name": "autopilot"})
-            actor = Actor(next(self._numbers), about, Placement(), box=box)
+                actor = NativeCar(actor.id, about, actor.own_place, box=box)
+                actor.limit = self._limit_at(actor)
             self._natives[body.id] = self._actors[actor.id] = actor
             self._by_kind.clear()
         actor = self._natives[body.id]
@@ -219,11 +224,11 @@ class Episode:
         """What an actor's kind adds to its row."""
         if isinstance(actor, Light):
             return self.lights.part(actor, self.time)
-        if actor.kind.startswith("vehicle."):
+        if isinstance(actor, Vehicle | NativeCar):
             light = self._at_light.get(actor.id)
             at = (NUMBERS[light.state], light.id) if light else None
-            control, limit = (actor.control, actor.limit) if isinstance(actor, Vehicle) else (VehicleControl(), 30.0)
-            return snapshot.vehicle_part(control, limit, at)
+            control = actor.control if isinstance(actor, Vehicle) else VehicleControl()
+            return snapshot.vehicle_part(control, actor.limit, at)
         if isinstance(actor, Walker):
             return snapshot.walker_part(actor.control)
         return snapshot.sign_part(actor.sign) if actor.sign else b""

@@ -18,7 +18,6 @@ from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.world.traffic.collisions import obstacle_of
 
 EARTH = 0.9996 * 6_378_137.0  # m, the radius by which CARLA's client turns places into degrees (it scales by UTM's)
-GRAVITY = 9.81  # m/s²
 
 
 def geo_location(place: Placement) -> tuple[float, float, float]:
@@ -41,7 +40,7 @@ def imu(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message
     ahead, right = c * acceleration[0] + s * acceleration[1], c * acceleration[1] - s * acceleration[0]
     gyro = tuple(math.radians(rate) for rate in turning)
     compass = math.radians((yaw + 90.0) % 360.0)
-    yield Sensor.IMU, [wire.encode(((ahead, right, acceleration[2] + GRAVITY), gyro, compass))]
+    yield Sensor.IMU, [wire.encode(((ahead, right, acceleration[2] + episode.gravity), gyro, compass))]
 
 
 def collisions(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:

@@ -28,6 +28,7 @@ ENGINE_BRAKE = 0.5  # of the brake: what a gear against the motion does
 AXLES = 0.62  # of the length lie between them
 FULL_THROTTLE, FULL_BRAKE = 3.0, 8.0  # m/s² that a whole pedal is worth to the Ackermann controller
 CM = 100.0  # in a m
+WIDEST = 80.0  # degrees that a wheel may turn
 
 
 @dataclass(eq=False)
@@ -189,7 +190,9 @@ def set_physics(vehicle: Vehicle, physics: PhysicsControl) -> None:
     if not physics.mass >= 1.0:
         raise Refusal(f"found a mass of {physics.mass} kg, wanted 1 kg at least: give another one")
     angles = [wheel.max_steer_angle for wheel in physics.wheels[:2]]
-    if angles and 1.0 <= max(angles) <= 80.0:
+    if angles and not (all(0.0 <= angle <= WIDEST for angle in angles) and max(angles) >= 1.0):
+        raise Refusal(f"found max_steer_angle {angles} of the front wheels, wanted 1 to {WIDEST:g} degrees: set others")
+    if angles:
         vehicle.config = replace(vehicle.config, max_steer=math.radians(max(angles)))
     wheels = own_wheels(physics, vehicle.physics, vehicle.friction_here)
     vehicle.physics = msgspec.structs.replace(physics, wheels=wheels)

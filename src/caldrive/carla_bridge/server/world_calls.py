@@ -14,6 +14,7 @@ from caldrive.carla_bridge.server.layouts import BoundingBox, Rotation, Transfor
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.datatypes import Pose, VehicleState
+from caldrive.world.roads.network import SIDEWALK_WIDTH
 from caldrive.world.scene.scenery import Prop
 
 ANY = 255  # the label of everything
@@ -93,7 +94,8 @@ class WorldCalls:
         return [point] if meets else []
 
     def _ground(self, x: float, y: float) -> int:
-        return Label.ROAD if shapely.contains_xy(self._server.episode.town.roads.roadway, x, -y) else Label.SIDEWALK
+        away = shapely.distance(self._server.episode.town.roads.roadway, shapely.Point(x, -y))
+        return Label.ROAD if away == 0.0 else Label.SIDEWALK if away <= SIDEWALK_WIDTH else Label.TERRAIN
 
 
 def _label(prop: Prop) -> int:
