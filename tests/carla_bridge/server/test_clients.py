@@ -86,6 +86,15 @@ def test_who_says_nothing_makes_room_for_others_and_who_calls_stays(
         one.close()
 
 
+def test_a_machine_that_has_vanished_is_noticed_within_a_minute(world: World) -> None:
+    with world.connect():
+        [client] = world.clients._clients.values()
+        assert client.socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+        names = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+        first, between, n = (client.socket.getsockopt(socket.IPPROTO_TCP, name) for name in names)
+        assert first + n * between <= 60  # s
+
+
 def test_many_who_send_no_calls_are_told_of_once(world: World, capsys: pytest.CaptureFixture[str]) -> None:
     for _ in range(5):
         with world.connect() as one:
