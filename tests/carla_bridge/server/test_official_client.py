@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,14 +18,17 @@ from typing import Any
 
 import pytest
 
+from caldrive.carla_bridge.server.actors import NOBODY, Actor
+from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import Subscriber
 from caldrive.commands.serve_carla import make_server
-from tests.carla_bridge.server.wire_client import free_port
+from tests.carla_bridge.server.wire_client import WireClient, free_port
 
 PORT, MANAGER = free_port(), free_port()
 ROOT = Path(__file__).parents[3]
 PATIENCE = 900.0  # s
+LAST_CALL = 20  # of those that `perishes` makes
 pytestmark = pytest.mark.skipif(find_spec("carla") is None, reason="needs the wheel of CARLA's client")
 
 
@@ -125,7 +128,34 @@ def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server
     assert run("cameras")["moved"] > 1.0
 
 
-def test_a_client_whose_sensors_have_ended_does_not_connect_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_in_asynchronous_mode_goes_with_the_clock(server: subprocess.Popen[bytes]) -> None:
+    found = run("asynchronous")
+    assert found["in_order"]
+    assert found["step"] == pytest.approx(0.05)  # s
+    assert found["speed"] > 2.0
+    assert found["image"] == [64, 32]
+    assert (found["heard"], found["ticks"], found["left"]) == (True, True, 0)
+
+
+@pytest.fixture
+def near() -> Iterator[Server]:
+    """A server in this process, which turns while a program runs."""
+    made = make_server(ServerSettings(town="town01", port=free_port()))
+    yield made
+    made.close()
+
+
+def beside(near: Server, program: str, *arguments: str) -> subprocess.Popen[str]:
+    """A program that has run to its end beside a server."""
+    with start(program, *arguments, port=near.settings.port) as process:
+        while process.poll() is None:
+            near.turn(0.05)
+        return process
+
+
+def test_a_client_whose_sensors_have_ended_does_not_connect_again_and_again(
+    near: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
     connections: list[int] = []
     counted = Subscriber.__init__
 
@@ -134,12 +164,19 @@ def test_a_client_whose_sensors_have_ended_does_not_connect_again_and_again(monk
         counted(one, connection)
 
     monkeypatch.setattr(Subscriber, "__init__", counting)
-    near = make_server(ServerSettings(town="town01", port=free_port()))
-    with closing(near), start("orphans", port=near.settings.port) as process:
-        while process.poll() is None:
-            near.turn(0.05)
-        assert process.returncode == 0, process.communicate()[1]
+    assert beside(near, "orphans").returncode == 0
     assert len(connections) == 4  # of the world and three sensors
+
+
+def test_a_client_that_is_killed_at_any_call_leaves_nothing(near: Server, capfd: pytest.CaptureFixture[str]) -> None:
+    for k in range(1, LAST_CALL + 1):
+        assert beside(near, "perishes", str(k)).returncode == -signal.SIGKILL
+        newcomer = WireClient(near)
+        assert newcomer.call("version") == "0.9.16"
+        assert not [one.kind for one in near.episode.all(Actor) if one.owner != NOBODY]
+        assert newcomer.call("get_episode_settings")[0] is False
+        newcomer.leave()
+    assert "fault" not in capfd.readouterr().err
 
 
 def test_a_client_whose_server_is_killed_is_told_so(server: subprocess.Popen[bytes]) -> None:  # the last test

@@ -18,6 +18,7 @@ from caldrive.world.roads.network import SIDEWALK_WIDTH
 from caldrive.world.scene.scenery import Prop
 
 ANY = 255  # the label of everything
+FARTHEST = 1e7  # m from the origin where there is still ground
 PROP_LABELS = {
     "building": Label.BUILDING, "wall": Label.WALL, "fence": Label.FENCE, "lamp": Label.POLE, "light_post": Label.LIGHT,
     "sign_post": Label.SIGN, "tree": Label.VEGETATION, "hedge": Label.VEGETATION,
@@ -82,8 +83,9 @@ class WorldCalls:
     def project(self, caller: int, at: Vector, direction: Vector, distance: float) -> tuple[bool, Any]:
         """Where a ray meets the ground, which is flat and the only thing that it can meet."""
         along = -at.z / direction.z if direction.z else math.inf
-        meets = 0.0 <= along <= distance
-        x, y = (at.x + along * direction.x, at.y + along * direction.y) if meets else (0.0, 0.0)
+        x, y = at.x + along * direction.x, at.y + along * direction.y
+        meets = 0.0 <= along <= distance and abs(x) < FARTHEST and abs(y) < FARTHEST
+        x, y = (x, y) if meets else (0.0, 0.0)
         return meets, (Vector(x, y, 0.0), self._ground(x, y))
 
     @call("cast_ray")
