@@ -91,6 +91,8 @@ def way_ahead(pose: Pose, distance: float, radius: float, near: Iterable[Obstacl
     start, line = shapely.Point(pose.x, pose.y), shapely.LineString(((pose.x, pose.y), (ahead.x, ahead.y)))
     capsule = line.buffer(radius)
     for one in near:
+        if not _is_near(one.pose, pose, distance + radius + half_diagonal(one)):
+            continue
         part = capsule.intersection(shapely.Polygon(box_corners(one.pose, one.length, one.width)))
         away = math.inf if part.is_empty else start.distance(part)
         if away <= distance and (best is None or away < best[1]):

@@ -17,12 +17,11 @@ from caldrive.carla_bridge.server.calls import Call, serve, turned_down
 from caldrive.carla_bridge.server.clients import Clients
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
-from caldrive.carla_bridge.server.log import Log
+from caldrive.carla_bridge.server.log import Log, Refusals
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
 from caldrive.carla_bridge.server.population import require_room
-from caldrive.carla_bridge.server.refusals import Refusals
 from caldrive.carla_bridge.server.sensor_actors import SensorActor
 from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
