@@ -6,6 +6,7 @@ import errno
 import io
 import json
 import math
+import resource
 import sys
 from collections import defaultdict
 from dataclasses import replace
@@ -37,7 +38,8 @@ from caldrive.datatypes import (
 )
 from caldrive.driving.tasks import task_scenarios
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
-from caldrive.visualization.channels import DriveRecording, differences
+from caldrive.visualization import mcap_file as module
+from caldrive.visualization.channels import DriveRecording, Picture, differences
 from caldrive.visualization.mcap_file import McapFile
 from caldrive.visualization.scenes import camera_place
 from caldrive.world.roads.network import RoadNetwork
@@ -295,6 +297,34 @@ def test_a_disk_that_is_full_at_the_end_is_named_and_leaves_no_file(
     with pytest.raises(OSError, match=r"No space left on device: .*a\.mcap"):
         record(tmp_path / "a.mcap", [step()])
     assert list(tmp_path.iterdir()) == []
+
+
+def noise(k: int) -> Picture:
+    """A picture of 50 kB that nothing can compress."""
+    return Picture(np.random.default_rng(k).bytes(50_000))
+
+
+def write_noise(path: Path, n: int) -> None:
+    with McapFile(path, keeps=True) as file:
+        for k in range(n):
+            file.write("/camera", k / 10, noise(k))
+
+
+@pytest.mark.parametrize(("room", "n"), [(330_000, 6), (1_030_000, 20)], ids=["while it is written", "at the end"])
+def test_a_disk_that_is_full_keeps_whole_chunks_where_that_is_wanted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int, n: int
+) -> None:
+    monkeypatch.setattr(module, "CHUNK", 100_000)
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, usual[1]))  # as full as a disk can be
+    try:
+        with pytest.raises(OSError, match=r"a\.mcap"):
+            write_noise(tmp_path / "a.mcap", 21)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+    kept = Read((tmp_path / "a.mcap").read_bytes()).messages["/camera"]
+    assert [one.data for one in kept] == [noise(k).jpeg for k in range(n)]
 
 
 ROAD = ("drive", "--world", "tests.fakes:StraightRoad", "--from", "0,0", "--to", "30,0", "--seconds", "0.5")

@@ -25,6 +25,6 @@ class CheckCarla(Output):
         checks = []
         for check in checklist(self.host, self.port):
             checks.append(check)
-            progress(check.what, len(checks) / (len(LOOKS) + 2))
+            progress(check.what, len(checks) / (len(LOOKS) + 3))
         rows = [asdict(check) for check in checks]
         return Answer({"checks": rows}, checks_table(checks), int(not all(check.ok for check in checks)))

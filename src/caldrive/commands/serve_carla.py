@@ -47,7 +47,7 @@ def _recording(path: Path | None) -> Iterator[RunRecording | None]:
     from caldrive.visualization.mcap_file import ENDING, McapFile
 
     require_writable_file(path, "--record", ENDING)
-    with McapFile(path) as file:
+    with McapFile(path, keeps=True) as file:
         from caldrive.carla_bridge.server.run_recording import RunRecording
 
         yield RunRecording(file)

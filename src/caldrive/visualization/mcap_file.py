@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +14,7 @@ from caldrive.files import temporary_path
 from caldrive.visualization.channels import FIELDS, Content, Values
 
 ENDING = ".mcap"
+MAGIC = b"\x89MCAP0\r\n"  # at both ends of a file
 CHUNK = 1 << 20  # bytes that are compressed together, and are in memory until then
 
 
@@ -30,13 +33,15 @@ def require_mcap() -> None:
 class McapFile:
     """A `channels.Writer` of a file. The same messages give the same bytes.
 
-    Use it in a `with` block: the file appears whole at the block's end, and not at all after an error. Raises
-    RuntimeError where the libraries are missing, OSError where the file cannot be written.
+    Use it in a `with` block: the file appears whole at the block's end, and not at all after an error. keeps: whether
+    what was written until the disk was full appears nevertheless. Raises RuntimeError where the libraries are missing,
+    OSError where the file cannot be written.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, keeps: bool = False) -> None:
         require_mcap()
-        self.path = path
+        self.path, self._keeps = path, keeps
+        self._whole, self._is_cut = 0, False  # bytes of whole chunks in the file; whether it ends there
         self._temporary = temporary_path(path)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -45,10 +50,45 @@ class McapFile:
         """A message of a channel."""
         from caldrive.visualization.foxglove_messages import message, nanoseconds
 
-        data, now = message(content, time), nanoseconds(time)
+        with self._cut_where_it_is_full():
+            data, now = message(content, time), nanoseconds(time)
+            self._add(topic, now, content, data)
+
+    def _add(self, topic: str, now: int, content: Content, data: Any) -> None:
         if topic not in self._channels:
             self._channels[topic] = self._open_channel(topic, type(data), content)
         self._writer.add_message(self._channels[topic], now, data.SerializeToString(deterministic=True), now)
+        if self._file.tell() > self._whole:
+            self._flush()
+
+    def _flush(self) -> None:
+        self._file.flush()
+        self._whole = self._file.tell()
+
+    @contextmanager
+    def _cut_where_it_is_full(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as failure:  # it comes without the name
+            if self._keeps:
+                self._cut()
+            raise OSError(failure.errno, failure.strerror, str(self.path)) from failure
+
+    def _cut(self) -> None:
+        """Ends the file after its last whole chunk, without an index."""
+        from mcap.data_stream import RecordBuilder
+        from mcap.records import DataEnd, Footer
+
+        end = RecordBuilder()
+        DataEnd(0).write(end)
+        Footer(0, 0, 0).write(end)
+        self._file.raw.close()  # else the rest would be written now
+        with suppress(OSError), self._temporary.open("r+b") as file:  # readers also take a file without an end
+            file.truncate(self._whole)
+            file.seek(self._whole)
+            file.write(end.end() + MAGIC)  # type: ignore[no-untyped-call]
+        os.replace(self._temporary, self.path)
+        self._is_cut = True
 
     def _open_channel(self, topic: str, schema: Any, content: Content) -> int:
         """The number of a new channel, whose metadata say the units of its fields."""
@@ -68,14 +108,16 @@ class McapFile:
         self._file = self._temporary.open("wb")
         self._writer: Any = Writer(self._file, chunk_size=CHUNK)
         self._writer.start(library="caldrive")
+        self._flush()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         try:
-            with self._file:
-                if kind is None:
+            with closing(self._file), self._cut_where_it_is_full():
+                if kind is None and not self._is_cut:
                     self._writer.finish()
-            if kind is None:
+                    self._file.flush()
+            if kind is None and not self._is_cut:
                 os.replace(self._temporary, self.path)
         except OSError as failure:  # from a full disk it comes without the name
             raise OSError(failure.errno, failure.strerror, str(self.path)) from failure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +10,6 @@ from typing import Any
 import pytest
 
 from caldrive.carla_bridge.client.actors import Actors, lights_at_posts, place_of, transform_of
-from caldrive.carla_bridge.client.connection import carla_module
 from caldrive.datatypes import ContactKind, LightState, Pose, VehicleState
 from caldrive.world.roads.towns import load_roads
 
@@ -109,9 +107,3 @@ def test_the_hardest_hit_counts_and_whose_fault_it_is() -> None:
     assert (car.kind, car.impulse, car.at_fault) == (ContactKind.CAR, 4000.0, True)
     assert (person.kind, person.at_fault) == (ContactKind.PERSON, False)  # who walks into its flank
     assert (thing.kind, thing.at_fault) == (ContactKind.OBJECT, True)
-
-
-def test_without_the_wheel_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "carla", None)
-    with pytest.raises(RuntimeError, match=r"^found no CARLA client, wanted .*pip install 'caldrive\[carla\]'"):
-        carla_module()

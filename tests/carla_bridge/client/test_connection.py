@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -95,6 +96,75 @@ class Recorded:
 
     def close(self) -> None:
         self.log.append("closed")
+
+
+class Clock:
+    """A world in synchronous mode, left so by somebody or stepped by another client."""
+
+    def __init__(self, step: int) -> None:
+        self.frame, self._step, self.settings = (
+            7,
+            step,
+            SimpleNamespace(synchronous_mode=True, fixed_delta_seconds=0.05),
+        )
+
+    def get_settings(self) -> SimpleNamespace:
+        return SimpleNamespace(**vars(self.settings))
+
+    def apply_settings(self, settings: SimpleNamespace) -> None:
+        self.settings = settings
+
+    def get_snapshot(self) -> Any:
+        self.frame += self._step
+        return SimpleNamespace(frame=self.frame, timestamp=SimpleNamespace(elapsed_seconds=5.0))
+
+    def get_actors(self) -> list[Any]:
+        return []
+
+    def tick(self, _: float) -> int:
+        return self.frame
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Clock:
+    monkeypatch.setattr(connection, "STILL", 0.0)
+    made = Clock(request.param)
+    monkeypatch.setattr(Client, "get_world", lambda _: made)
+    return made
+
+
+@pytest.mark.parametrize("clock", [0], indirect=True)
+def test_a_server_that_a_killed_process_left_waiting_goes_on_in_the_end(clock: Clock) -> None:
+    found = Connection("here", 2000)
+    found.synchronise()
+    assert (clock.settings.synchronous_mode, clock.settings.fixed_delta_seconds) == (True, 0.1)
+    found.close()
+    assert (clock.settings.synchronous_mode, clock.settings.fixed_delta_seconds) == (False, None)
+
+
+@pytest.mark.parametrize("clock", [1], indirect=True)
+def test_a_server_that_another_client_steps_is_refused_and_left_as_it_is(clock: Clock) -> None:
+    found = Connection("here", 2000)
+    with pytest.raises(RuntimeError, match=r"^found another client that steps CARLA at here:2000, wanted it alone"):
+        found.synchronise()
+    found.close()
+    assert (clock.settings.synchronous_mode, clock.settings.fixed_delta_seconds) == (True, 0.05)
+
+
+def test_a_connection_that_fails_while_it_is_cleared_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Failing(Recorded):
+        def answers(self) -> Any:
+            return nullcontext()
+
+        def clear(self) -> None:
+            raise RuntimeError(SAID)
+
+    log: list[str] = []
+    world = CarlaWorld()
+    world._connection = Failing(log)  # type: ignore[assignment]
+    with pytest.raises(RuntimeError, match="time-out"):
+        world.reset(task_scenarios("town01", "straight")[0])
+    assert log == ["connected", "closed"]
 
 
 def test_a_reset_that_fails_puts_everything_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -116,6 +116,12 @@ def test_what_a_killed_process_left_is_removed_and_a_dead_server_is_a_sentence(s
     assert found["error"].startswith(f"found no answer from CARLA at 127.0.0.1:{NOBODY}, wanted a server there")
 
 
+def test_a_server_that_a_killed_process_left_waiting_goes_by_itself_again(server: None) -> None:
+    run(f"{PROGRAMS}.is_killed", str(PORT), "early", code=9)
+    found = run(f"{PROGRAMS}.comes_after", str(PORT), str(NOBODY))
+    assert (found["left"], found["delta"], found["sync"]) == (0, 0.1, False)
+
+
 def test_the_checklist_has_nothing_to_say_against_our_server(server: None) -> None:
     checks = run("caldrive", "check-carla", "--port", str(PORT), "--json")["checks"]
     assert len(checks) > 10

@@ -109,10 +109,27 @@ def test_a_call_is_refused_in_a_sentence(client: WireClient, numbers: dict[str, 
         client.call(method, *arguments)
 
 
-@pytest.mark.parametrize("kind", ["sensor.camera.dvs", "sensor.other.rss", "sensor.camera.optical_flow"])
+NOT_SIMULATED = [
+    *(f"sensor.camera.{kind}" for kind in ("dvs", "optical_flow", "normals", "cosmos_visualization")),
+    *(f"sensor.other.{kind}" for kind in ("rss", "v2x", "v2x_custom")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", NOT_SIMULATED)
 def test_a_sensor_that_is_not_simulated_is_refused_when_it_is_spawned(client: WireClient, kind: str) -> None:
     with pytest.raises(RefusedError, match=r"docs/carla\.md"):
         client.spawn(kind, (0.0, 0.0, 0.0))
+
+
+def test_every_walker_and_thing_in_the_library_can_be_spawned(client: WireClient) -> None:
+    ids = [id for _, id, *_ in client.call("get_actor_definitions") if id.startswith(("walker.", "static.prop."))]
+    assert {"walker.pedestrian.0050", "static.prop.trafficcone02", "static.prop.busstop"} <= set(ids)
+    made = [client.spawn(id, (-500.0 + 10.0 * k, -500.0, 0.0)) for k, id in enumerate(ids)]
+    client.call("tick_cue")
+    boxes = [client.call("get_actor_bounding_box", number)[1] for number in made]
+    assert all(min(half_sizes) > 0.0 for half_sizes in boxes)
+    for number in made:
+        client.call("destroy_actor", number)
 
 
 def test_no_call_that_the_server_knows_is_untested(server: Server) -> None:

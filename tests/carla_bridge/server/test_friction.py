@@ -109,6 +109,16 @@ def test_a_mass_that_cannot_be_is_refused_and_changes_nothing(mass: float) -> No
     assert car.config.max_steer == steer
 
 
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (90.0, 70.0), (math.nan, 70.0), (-5.0, 70.0)])
+def test_wheels_that_cannot_turn_so_far_are_refused_and_nothing_changes(angles: tuple[float, float]) -> None:
+    car, steer = vehicle(), vehicle().config.max_steer
+    with pytest.raises(Refusal, match="max_steer_angle"):
+        set_physics(car, PhysicsControl(wheels=tuple(Wheel(max_steer_angle=angle) for angle in angles)))
+    assert car.config.max_steer == steer
+    set_physics(car, PhysicsControl(wheels=(Wheel(max_steer_angle=50.0), Wheel(max_steer_angle=70.0))))
+    assert car.config.max_steer == pytest.approx(math.radians(70.0))
+
+
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
     made = make_server(ServerSettings(town="town01", port=free_port()))

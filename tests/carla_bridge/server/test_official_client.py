@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,11 +18,17 @@ from typing import Any
 
 import pytest
 
-from tests.carla_bridge.server.wire_client import free_port
+from caldrive.carla_bridge.server.actors import NOBODY, Actor
+from caldrive.carla_bridge.server.server import Server
+from caldrive.carla_bridge.server.settings import ServerSettings
+from caldrive.carla_bridge.server.streams import Subscriber
+from caldrive.commands.serve_carla import make_server
+from tests.carla_bridge.server.wire_client import WireClient, free_port
 
 PORT, MANAGER = free_port(), free_port()
 ROOT = Path(__file__).parents[3]
 PATIENCE = 900.0  # s
+LAST_CALL = 20  # of those that `perishes` makes
 pytestmark = pytest.mark.skipif(find_spec("carla") is None, reason="needs the wheel of CARLA's client")
 
 
@@ -51,9 +58,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Pope
 
 
 @contextmanager
-def start(program: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def start(program: str, *arguments: str, port: int = PORT) -> Iterator[subprocess.Popen[str]]:
     """A program as a process, which ends with the block."""
-    command = [sys.executable, "-m", f"tests.carla_bridge.server.programs.{program}", str(PORT), *arguments]
+    command = [sys.executable, "-m", f"tests.carla_bridge.server.programs.{program}", str(port), *arguments]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, env=environment(), cwd=ROOT, stdout=pipe, stderr=pipe, text=True) as process:
         try:
@@ -119,6 +126,57 @@ def test_a_client_that_is_killed_at_any_moment_costs_nobody_else_anything(server
             time.sleep(0.03 * k)
             process.kill()
     assert run("cameras")["moved"] > 1.0
+
+
+def test_a_program_in_asynchronous_mode_goes_with_the_clock(server: subprocess.Popen[bytes]) -> None:
+    found = run("asynchronous")
+    assert found["in_order"]
+    assert found["step"] == pytest.approx(0.05)  # s
+    assert found["speed"] > 2.0
+    assert found["image"] == [64, 32]
+    assert (found["heard"], found["ticks"], found["left"]) == (True, True, 0)
+
+
+@pytest.fixture
+def near() -> Iterator[Server]:
+    """A server in this process, which turns while a program runs."""
+    made = make_server(ServerSettings(town="town01", port=free_port()))
+    yield made
+    made.close()
+
+
+def beside(near: Server, program: str, *arguments: str) -> subprocess.Popen[str]:
+    """A program that has run to its end beside a server."""
+    with start(program, *arguments, port=near.settings.port) as process:
+        while process.poll() is None:
+            near.turn(0.05)
+        return process
+
+
+def test_a_client_whose_sensors_have_ended_does_not_connect_again_and_again(
+    near: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    connections: list[int] = []
+    counted = Subscriber.__init__
+
+    def counting(one: Subscriber, connection: socket.socket) -> None:
+        connections.append(1)
+        counted(one, connection)
+
+    monkeypatch.setattr(Subscriber, "__init__", counting)
+    assert beside(near, "orphans").returncode == 0
+    assert len(connections) == 4  # of the world and three sensors
+
+
+def test_a_client_that_is_killed_at_any_call_leaves_nothing(near: Server, capfd: pytest.CaptureFixture[str]) -> None:
+    for k in range(1, LAST_CALL + 1):
+        assert beside(near, "perishes", str(k)).returncode == -signal.SIGKILL
+        newcomer = WireClient(near)
+        assert newcomer.call("version") == "0.9.16"
+        assert not [one.kind for one in near.episode.all(Actor) if one.owner != NOBODY]
+        assert newcomer.call("get_episode_settings")[0] is False
+        newcomer.leave()
+    assert "fault" not in capfd.readouterr().err
 
 
 def test_a_client_whose_server_is_killed_is_told_so(server: subprocess.Popen[bytes]) -> None:  # the last test

@@ -28,7 +28,7 @@ class Notes:
 
     def write(self, topic: str, time: float, content: Content) -> None:
         if self.is_full:
-            raise OSError(errno.ENOSPC, "No space left on device")
+            raise OSError(errno.ENOSPC, "No space left on device", "run.mcap")
         self.messages.append((topic, time, content))
 
     def of(self, topic: str) -> list[Content]:
@@ -82,7 +82,9 @@ def test_a_clients_run_is_recorded_from_episode_to_episode(
     notes.is_full = True
     assert client.call("tick_cue") == server.frame
     assert client.call("tick_cue") == server.frame  # the server goes on
-    assert capsys.readouterr().err.count("found that run.mcap cannot be written (No space left on device)") == 1
+    assert (
+        capsys.readouterr().err.count("found that run.mcap cannot be written any more (No space left on device)") == 1
+    )
     client.leave()
 
 

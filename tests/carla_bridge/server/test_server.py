@@ -7,6 +7,7 @@ import re
 import socket
 import struct
 from collections.abc import Iterator
+from pathlib import Path
 
 import msgpack
 import numpy as np
@@ -16,12 +17,16 @@ from caldrive.carla_bridge.axes import compose
 from caldrive.carla_bridge.server import clients
 from caldrive.carla_bridge.server.actors import Actor
 from caldrive.carla_bridge.server.layouts import Transform, placement
+from caldrive.carla_bridge.server.maps import Maps
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.carla_bridge.server.wire import Request
 from caldrive.commands.serve_carla import make_server
 from caldrive.datatypes import LightState
+from caldrive.geometry import moved
+from caldrive.world.roads.towns import load_roads
+from caldrive.world.traffic.sidewalks import room
 from tests.carla_bridge.server.wire_client import Reader, RefusedError, WireClient, free_port, positions
 
 PORT = free_port()
@@ -109,6 +114,14 @@ def test_whoever_comes_alone_finds_the_same_world_byte_for_byte(server: Server) 
     assert run_of_20_ticks(server) == run_of_20_ticks(server)
 
 
+def test_the_first_program_after_the_start_finds_the_same_world_as_the_second() -> None:
+    fresh = make_server(ServerSettings(town="town01", port=free_port(), cars=2, people=3))
+    fresh.warm_up()
+    first, second = run_of_20_ticks(fresh), run_of_20_ticks(fresh)
+    fresh.close()
+    assert first == second
+
+
 def test_who_subscribes_already_hears_of_a_new_episode_with_its_first_step(client: WireClient) -> None:
     reader = Reader(client, WORLD)
     old = episode_of(reader.message())
@@ -128,6 +141,36 @@ def episode_of(snapshot: bytes) -> int:
     return number
 
 
+def test_a_world_that_cannot_be_loaded_costs_nobody_anything(
+    server: Server, client: WireClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "Odd.xodr").write_text("<OpenDRIVE/>")
+    other = WireClient(server)
+    car, episode = other.spawn("vehicle.tesla.model3", place(client, 0)), server.episode
+    reader = Reader(other, attached(other, "sensor.other.gnss", car) + 1)
+    monkeypatch.setattr(server, "maps", Maps(tmp_path))
+    for name in ("Nowhere", "Carla/Maps/Odd", "random:x", "random:-1", "random:" + 40 * "9"):
+        with pytest.raises(RefusedError, match=r"^found .*wanted"):
+            client.call("load_new_episode", name, True, 0)
+    assert client.call("get_episode_settings")[0] is True
+    client.call("tick_cue")
+    assert struct.unpack_from("<8xQ", reader.message()) == (server.frame,)
+    assert server.episode is episode
+    assert client.call("get_actors_by_id", [car])
+    other.leave()
+
+
+def test_a_town_without_room_for_all_who_live_there_costs_nobody_anything() -> None:
+    full = make_server(ServerSettings(town="town01", port=free_port(), people=room(load_roads("town02")) + 1))
+    client = WireClient(full)
+    episode = full.episode
+    with pytest.raises(RefusedError, match=r"town02 has room for \d+: ask for fewer with --people"):
+        client.call("load_new_episode", "town02", False, 0)
+    assert full.episode is episode
+    client.leave()
+    full.close()
+
+
 @pytest.mark.parametrize("bytes_", [b"\xc1", b"\x91" * 5000, msgpack.packb([7]), msgpack.packb({}), bytes(range(256))])
 def test_broken_messages_cost_their_own_connection_only(server: Server, client: WireClient, bytes_: bytes) -> None:
     with socket.create_connection(("127.0.0.1", PORT)) as broken:
@@ -143,6 +186,21 @@ def test_a_call_that_nobody_knows_is_refused_and_the_next_one_served(client: Wir
     with pytest.raises(RefusedError, match="fly"):
         client.call("fly", 1, 2)
     assert client.call("version") == "0.9.16"
+
+
+def test_what_is_refused_to_a_client_that_does_not_listen_is_said_once(
+    server: Server, client: WireClient, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(3):
+        client.tell("apply_control_to_vehicle", 10**6, control())
+        client.tell("apply_batch", [[[1, [10**6]]], [[2, [10**6, control()]]]], False)
+        client.tell("set_actor_location", client.server.episode.spectator.id, [1.0, 2.0, 3.0])
+    with pytest.raises(RefusedError):
+        client.call("apply_ackermann_control_to_vehicle", 10**6, [0.0, 0.0, 3.0, 0.0, 0.0])  # it hears it itself
+    said = capsys.readouterr().err
+    assert said.count("was refused") == 2
+    assert "apply_control_to_vehicle of a client was refused" in said
+    assert "caldrive: apply_batch of a client was refused" in said
 
 
 def test_a_light_shows_what_a_client_wants_until_its_time_is_over(server: Server, client: WireClient) -> None:
@@ -165,15 +223,14 @@ def test_a_light_that_is_given_a_time_after_its_state_keeps_it_for_so_long(serve
     assert light.state is LightState.GREEN
 
 
-def test_a_light_that_is_switched_off_leaves_the_others_of_its_junction_alone(
-    server: Server, client: WireClient
-) -> None:
-    first, second, *_ = server.episode.lights.of_junction(server.episode.lights.actors[0])
-    for light in (first, second):
-        client.call("set_traffic_light_state", light.id, 2)
-    client.call("set_traffic_light_state", first.id, 3)
-    assert (first.held, second.state) == (None, LightState.GREEN)
-    assert second.held is not None
+@pytest.mark.parametrize("state", [3, 4, -1])
+def test_a_light_is_not_switched_off_and_shows_what_it_showed(server: Server, client: WireClient, state: int) -> None:
+    light = server.episode.lights.actors[0]
+    client.call("set_traffic_light_state", light.id, 2)
+    with pytest.raises(RefusedError, match="wanted Red, Yellow or Green"):
+        client.call("set_traffic_light_state", light.id, state)
+    assert light.state is LightState.GREEN
+    assert light.held is not None
 
 
 def test_every_sign_and_light_has_its_id_on_the_map(server: Server, client: WireClient) -> None:
@@ -214,6 +271,22 @@ def test_a_batch_spawns_and_what_follows_means_the_new_actor(client: WireClient)
         client.call("tick_cue")
         seen.append(positions(reader.message())[car])
     assert seen[0] != seen[-1]
+
+
+def test_what_follows_a_spawn_is_attached_to_it(server: Server, client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+
+    def spawn(kind: str, parent: list[object], at: object, *then: object) -> list[object]:
+        return [[0, [[1, kind, []], at, parent, 0, "", [*then]]]]
+
+    camera = spawn("sensor.other.gnss", [True, 0], [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0]])
+    car = spawn("vehicle.audi.tt", [False], [[x, y, 0.3], [0.0, yaw, 0.0]], camera)
+    [[[done, number]], [[failed, [text]]]] = client.call("apply_batch", [car, camera], False)
+    [sensor] = server.sensors()
+    assert sensor.parent is not None
+    assert (done, sensor.parent.id) == (1, number)
+    assert failed == 0
+    assert "FutureActor" in text
 
 
 @pytest.mark.parametrize("fixed_delta", [[], [True], [True, 20.0], [True, -0.1], [2, -5.0], [True, float("nan")]])
@@ -329,6 +402,21 @@ def test_a_vehicle_that_hits_a_standing_one_says_so(client: WireClient) -> None:
     assert sum(part**2 for part in impulse) > 1000.0**2
 
 
+def test_somebody_who_is_run_into_says_so_too(server: Server, client: WireClient) -> None:
+    x, y, yaw = place(client, 0)
+    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    car = client.spawn("vehicle.tesla.model3", (x, y, yaw))
+    walker = client.spawn("walker.pedestrian.0001", (x + 5 * c, y + 5 * s, yaw))
+    readers = [Reader(client, attached(client, "sensor.other.collision", one) + 1) for one in (car, walker)]
+    client.call("set_actor_target_velocity", car, [10.0 * c, 10.0 * s, 0.0])
+    while not server.episode.hits:
+        client.call("tick_cue")
+    (own, other, back), (struck, by, forth) = (msgpack.unpackb(reader.message()[48:]) for reader in readers)
+    assert (own[0], other[0], struck[0], by[0]) == (car, walker, walker, car)
+    assert back[0] * c + back[1] * s < -100.0  # N s
+    assert forth == pytest.approx([-part for part in back])
+
+
 def test_who_is_spawned_before_the_first_step_is_in_the_next_frame(server: Server) -> None:
     free = WireClient(server)
     reader = Reader(free, WORLD)
@@ -340,16 +428,31 @@ def test_who_is_spawned_before_the_first_step_is_in_the_next_frame(server: Serve
     free.leave()
 
 
-def test_what_is_put_aside_far_below_the_ground_meets_nobody(server: Server, client: WireClient) -> None:
+@pytest.mark.parametrize("has_physics", [True, False])
+def test_what_is_put_aside_far_below_the_ground_is_nowhere_until_it_is_needed(
+    server: Server, client: WireClient, has_physics: bool
+) -> None:
     x, y, yaw = place(client, 0)
     client.spawn("vehicle.tesla.model3", (x, y, yaw))
     aside = [[x, y, -500.0], [0.0, yaw, 0.0]]
     parked, *_ = client.call("spawn_actor", [1, "vehicle.audi.tt", []], aside)
-    client.call("set_actor_simulate_physics", parked, False)
+    client.call("set_actor_simulate_physics", parked, has_physics)
+    client.call("apply_control_to_vehicle", parked, control(throttle=1.0))
+    walker, *_ = client.call("spawn_actor", [1, "walker.pedestrian.0001", []], aside)
     client.call("spawn_actor", [1, "static.prop.container", []], aside)
-    client.call("tick_cue")
+    for _ in range(5):
+        client.call("tick_cue")
     assert not server.episode.hits
     assert (len(server.episode.bodies()), server.episode.props()) == (1, [])
+    for number in (parked, walker):
+        actor = server.episode.get(number)
+        assert actor is not None
+        assert (actor.place.x, actor.place.y, actor.place.z) == pytest.approx((x, -y, -500.0))
+    x, y, yaw = place(client, 2)
+    client.call("set_actor_transform", parked, [[x, y, 0.3], [0.0, yaw, 0.0]])
+    client.call("set_actor_transform", walker, [[x, y + 5.0, 1.0], [0.0, yaw, 0.0]])
+    client.call("tick_cue")
+    assert len(server.episode.bodies()) == 3
 
 
 def test_a_sensor_that_speaks_now_and_then_keeps_its_distance(server: Server, client: WireClient) -> None:
@@ -364,6 +467,40 @@ def test_a_sensor_that_speaks_now_and_then_keeps_its_distance(server: Server, cl
     for _ in range(3):
         spoken.append(struct.unpack_from("<16xd", reader.message())[0])
     assert np.diff(spoken) == pytest.approx([0.5, 0.5])
+
+
+def test_gravity_is_what_imus_feel(client: WireClient) -> None:
+    car = client.spawn("vehicle.tesla.model3", place(client, 0))
+    reader = Reader(client, attached(client, "sensor.other.imu", car) + 1)
+    client.call("set_imui_gravity", 1.62)
+    assert client.call("get_imui_gravity") == 1.62
+    client.call("tick_cue")
+    acceleration, *_ = msgpack.unpackb(reader.message()[48:])
+    assert acceleration[2] == pytest.approx(1.62)
+
+
+def test_cars_of_the_town_are_told_the_limit_of_their_lane() -> None:
+    served = make_server(ServerSettings(town="town01", port=free_port(), cars=20))
+    roads, lawful = served.episode.town.roads, {}
+    for car in served.episode.cars:
+        actor = served.episode.actor_of(car.id)
+        assert actor is not None
+        lawful[actor.id] = roads.lane_at(car.pose)[0].limit
+    rows = served._latest[48 + 36 :]
+    told = {
+        struct.unpack_from("<I", rows, k)[0]: struct.unpack_from("<f", rows, k + 65 + 19)[0]
+        for k in range(0, len(rows), 119)
+    }
+    served.close()
+    assert len(set(lawful.values())) > 1
+    assert {number: told[number] for number in lawful} == pytest.approx(lawful)
+
+
+def test_a_ray_tells_the_road_from_the_sidewalk_and_what_is_beyond(server: Server, client: WireClient) -> None:
+    lane = max(server.episode.town.roads.driveable, key=lambda lane: lane.line.length)
+    beside = [moved(lane.line.pose_at(lane.line.length / 2), left=left) for left in (0.0, -4.0, -8.0)]
+    rays = [([pose.x, -pose.y, 1.0], [pose.x, -pose.y, -1.0]) for pose in beside]
+    assert [client.call("cast_ray", *ray)[0][1] for ray in rays] == [1, 2, 10]
 
 
 def test_a_refused_batch_has_the_form_of_a_list(client: WireClient) -> None:

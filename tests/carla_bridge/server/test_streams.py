@@ -11,6 +11,7 @@ from contextlib import suppress
 import pytest
 
 from caldrive.carla_bridge.server import streams as module
+from caldrive.carla_bridge.server.log import Log
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.streams import Streams
 
@@ -18,17 +19,24 @@ STREAM = 5
 MEGABYTE = bytes(1_000_000)
 
 
-@pytest.fixture
-def said() -> list[str]:
-    return []
+class Said(Log, list[str]):
+    """A log that is kept."""
+
+    def __call__(self, sentence: str) -> None:
+        self.append(sentence)
 
 
 @pytest.fixture
-def streams(said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Streams]:
+def said() -> Said:
+    return Said()
+
+
+@pytest.fixture
+def streams(said: Said, monkeypatch: pytest.MonkeyPatch) -> Iterator[Streams]:
     monkeypatch.setattr(module, "MOST_WAITING", 20_000_000)
     monkeypatch.setattr(module, "PATIENCE", 0.2)
     monkeypatch.setattr(module, "STALLED", 0.2)
-    made = Streams(listening("127.0.0.1", 0), said.append, newcomer=lambda stream: [b"first"])
+    made = Streams(listening("127.0.0.1", 0), said, newcomer=lambda stream: [b"first"])
     yield made
     made.close()
 
@@ -68,9 +76,7 @@ def test_nobody_waits_for_those_who_were_announced_to_a_stream_that_has_ended(st
     assert time.monotonic() - begin < 0.1
 
 
-def test_who_does_not_read_misses_messages_and_is_cut_off(
-    streams: Streams, reader: socket.socket, said: list[str]
-) -> None:
+def test_who_does_not_read_misses_messages_and_is_cut_off(streams: Streams, reader: socket.socket, said: Said) -> None:
     for _ in range(40):
         streams.send(STREAM, [MEGABYTE])  # does not wait
     assert len(said) == 1
@@ -84,9 +90,7 @@ def test_who_does_not_read_misses_messages_and_is_cut_off(
     assert "cut off" in said[-1]
 
 
-def test_whoever_reads_all_that_waited_gets_messages_again(
-    streams: Streams, reader: socket.socket, said: list[str]
-) -> None:
+def test_whoever_reads_all_that_waited_gets_messages_again(streams: Streams, reader: socket.socket, said: Said) -> None:
     for _ in range(40):
         streams.send(STREAM, [MEGABYTE])
     reader.settimeout(0.05)
@@ -98,18 +102,80 @@ def test_whoever_reads_all_that_waited_gets_messages_again(
     assert len(said) == 1
 
 
+def came_again(streams: Streams, seconds: float) -> int:
+    """How often a client connects, as CARLA's does: at once, whenever its connection is closed."""
+    until, connections = time.monotonic() + seconds, 0
+    while time.monotonic() < until:
+        connections += 1
+        with socket.create_connection(("127.0.0.1", streams.port)) as reader:
+            reader.send(struct.pack("<I", STREAM))
+            reader.setblocking(False)
+            while time.monotonic() < until:
+                streams.poll(0.01)
+                with suppress(BlockingIOError):
+                    if not reader.recv(2**20):
+                        break
+    return connections
+
+
 @pytest.mark.parametrize("was_there", [False, True], ids=["never there", "ended"])
-def test_who_wants_a_stream_that_is_not_there_is_sent_away(streams: Streams, was_there: bool) -> None:
-    """Or it would wait for ever, and count among the subscribers."""
+def test_who_wants_a_stream_that_is_not_there_comes_once(streams: Streams, was_there: bool) -> None:
     if was_there:
         streams.token(STREAM)
         streams.close_stream(STREAM)
-    with socket.create_connection(("127.0.0.1", streams.port)) as late:
-        late.send(struct.pack("<I", STREAM))
-        late.settimeout(5.0)
-        for _ in range(3):
-            streams.poll(0.05)
-        assert late.recv(100) == b""
+    assert came_again(streams, 1.0) == 1
+
+
+def test_who_reads_a_stream_that_ends_does_not_come_again(streams: Streams, reader: socket.socket) -> None:
+    assert reader.recv(100)
+    streams.close_stream(STREAM)
+    streams.poll(0.05)
+    reader.settimeout(0.2)
+    with pytest.raises(TimeoutError):  # neither a message nor an end
+        reader.recv(100)
+    assert not streams.is_wanted(STREAM)
+
+
+def connected(streams: Streams, n: int) -> list[socket.socket]:
+    """Connections that say nothing."""
+    made = [socket.create_connection(("127.0.0.1", streams.port)) for _ in range(n)]
+    streams.poll(0.05)
+    return made
+
+
+def is_closed(one: socket.socket) -> bool:
+    one.setblocking(False)
+    try:
+        return not one.recv(100)
+    except BlockingIOError:
+        return False
+
+
+def test_no_more_connections_to_ended_streams_are_kept_than_there_is_room_for(
+    streams: Streams, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "MOST_PARKED", 2)
+    made = connected(streams, 3)
+    for one in made:
+        one.send(struct.pack("<I", STREAM))
+        streams.poll(0.05)
+    assert [is_closed(one) for one in made] == [True, False, False]
+    for one in made:
+        one.close()
+
+
+def test_who_says_nothing_locks_nobody_out(streams: Streams, said: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_SUBSCRIBERS", 2)
+    monkeypatch.setattr(module, "SILENCE", 0.2)
+    made = connected(streams, 4)
+    assert [is_closed(one) for one in made] == [False, False, True, True]
+    assert said == ["a subscriber was turned away (as there are 2)"]  # not twice
+    time.sleep(0.3)
+    [late] = connected(streams, 1)
+    assert not is_closed(late)
+    assert is_closed(made[0])
+    for one in (*made, late):
+        one.close()
 
 
 @pytest.mark.parametrize("words", [bytes(5), struct.pack("<II", 5, 5)])
@@ -120,7 +186,7 @@ def test_who_says_more_than_a_number_harms_nobody(streams: Streams, words: bytes
             streams.poll(0.05)
 
 
-def test_who_reads_slowly_is_waited_for(streams: Streams, reader: socket.socket, said: list[str]) -> None:
+def test_who_reads_slowly_is_waited_for(streams: Streams, reader: socket.socket, said: Said) -> None:
     for _ in range(15):
         streams.send(STREAM, [MEGABYTE])
     reader.setblocking(False)

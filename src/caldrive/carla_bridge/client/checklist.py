@@ -73,18 +73,23 @@ def checklist(host: str, port: int) -> Iterator[Check]:
     with closing(Connection(host, port)) as connection:
         yield Check("version", True, f"CARLA {connection.client.get_server_version()} with {connection.map_name}")
         connection.synchronise()
-        visit = Visit(connection)
-        for what, look in LOOKS.items():
-            yield _checked(what, partial(look, visit))
+        begun: list[Visit] = []
+        yield _checked("map", lambda: _map(connection, begun))
+        for what, look in LOOKS.items() if begun else ():
+            yield _checked(what, partial(look, *begun))
     yield _checked("cleaning up", partial(_cleaned_up, host, port))
 
 
 def _checked(what: str, look: Callable[[], str]) -> Check:
-    """A row, by something that says what it found or raises what is wrong with it."""
+    """A row, by something that says what it found or raises what is wrong with it: whatever that is, the next row is
+    looked at."""
     try:
         return Check(what, True, look())
     except (ValueError, RuntimeError) as error:
         return Check(what, False, str(error))
+    except Exception as error:  # CARLA may answer something that nobody thought of
+        fault = f"{type(error).__name__}: {error}"
+        return Check(what, False, f"found a fault ({fault}), wanted an answer that caldrive understands: report it")
 
 
 def _require(met: bool, found: str, wanted: str) -> str:
@@ -94,8 +99,10 @@ def _require(met: bool, found: str, wanted: str) -> str:
     return found
 
 
-def _map(visit: Visit) -> str:
-    roads = visit.town.roads
+def _map(connection: Connection, begun: list[Visit]) -> str:
+    """Whether our reader takes the map; then a visit has begun on it."""
+    begun.append(Visit(connection))
+    roads = begun[0].town.roads
     lost = f"; left out: {', '.join(roads.dropped)}" if roads.dropped else ""
     return f"{len(roads.driveable)} lanes, {len(roads.posts)} lights, {len(roads.signs)} speed signs{lost}"
 
@@ -214,7 +221,7 @@ def _cleaned_up(host: str, port: int) -> str:
 
 
 LOOKS: dict[str, Callable[[Visit], str]] = {
-    "map": _map, "clock": _clock, "pace": _pace, "picture": _picture, "classes of pixels": _semantic, "car": _car,
+    "clock": _clock, "pace": _pace, "picture": _picture, "classes of pixels": _semantic, "car": _car,
     "car on its lane": _on_lane, "pedals": _pedals, "steering wheel": _wheel, "lights": _lights,
     "what lights show": _light_states, "speed signs": _signs, "collision": _collision,
 }  # fmt: skip

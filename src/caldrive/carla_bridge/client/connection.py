@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import socket
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from caldrive.carla_bridge.client.library import carla_module
 from caldrive.datatypes import DT
 from caldrive.files import write_whole
 from caldrive.scenarios import TOWNS, generated_town
@@ -22,21 +24,8 @@ OURS = "caldrive"  # the role name of all that is spawned
 PATIENCE, LOADING = 20.0, 120.0  # s to wait for an answer, and for a map
 FIRST_PATIENCE = 5.0  # s for the first answer of a server, and for a sign of life
 SUBSTEPS = 10  # of a step, 0.01 s each, as CARLA's physics wants them
+STILL = 1.0  # s without a step, after which nobody steps the server
 BEGIN = 1.0  # s of a new server's clock at which driving begins
-
-
-def carla_module() -> Any:
-    """CARLA's client library. Raises RuntimeError where it is not installed."""
-    try:
-        import carla
-    except ModuleNotFoundError as error:
-        if error.name != "carla":
-            raise
-        raise RuntimeError(
-            "found no CARLA client, wanted carla 0.9.16, which Python 3.10 to 3.12 can have: type pip install "
-            "'caldrive[carla]'"
-        ) from error
-    return carla
 
 
 class Connection:
@@ -135,23 +124,40 @@ class Connection:
 
     def synchronise(self) -> int:
         """Lets the server step when it is told to, from now on, and removes what an earlier drive left; returns how
-        many actors that were."""
+        many actors that were. Raises RuntimeError where another client steps it."""
         if self._before is not None:
             return 0
         with self.answers():
+            was_left_waiting = self._waits_for_a_client()
             self._before, settings = self.world.get_settings(), self.world.get_settings()
             settings.synchronous_mode, settings.fixed_delta_seconds = True, DT
             settings.no_rendering_mode = False  # else cameras say nothing
             settings.max_substeps, settings.max_substep_delta_time = SUBSTEPS, DT / SUBSTEPS
             self.world.apply_settings(settings)
             self.tick()  # before it a server that a killed process left waiting shows nobody
+            if was_left_waiting:  # a process that was killed cannot put that back
+                self._before.synchronous_mode, self._before.fixed_delta_seconds = False, None
             if left := self.left_behind():
                 self._remove(left)
-                self._before.synchronous_mode, self._before.fixed_delta_seconds = False, None
                 self.tick()
             while self.time < BEGIN:  # the client asks for some steps of its own, and not always as many
                 self.tick()
             return len(left)
+
+    def _waits_for_a_client(self) -> bool:
+        """Whether the server is in synchronous mode, and nobody steps it. Raises RuntimeError where somebody does."""
+        if not self.world.get_settings().synchronous_mode:
+            return False
+        frames = []
+        for _ in range(2):
+            time.sleep(STILL)  # the first time until the latest frame has come
+            frames.append(self.world.get_snapshot().frame)
+        if frames[0] != frames[1]:
+            raise RuntimeError(
+                f"found another client that steps CARLA at {self._address}, wanted it alone: end that program, or give "
+                "another server's --port"
+            )
+        return True
 
     def left_behind(self) -> list[int]:
         """The numbers of what is there under our name, of this connection or of a process that was killed."""

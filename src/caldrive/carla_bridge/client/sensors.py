@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from caldrive.carla_bridge.client.connection import PATIENCE, Connection, carla_module
+from caldrive.carla_bridge.client.connection import PATIENCE, Connection
+from caldrive.carla_bridge.client.library import carla_module
 from caldrive.datatypes import CameraConfig, Image, Semantic
 
 RGB, SEMANTIC = "sensor.camera.rgb", "sensor.camera.semantic_segmentation"

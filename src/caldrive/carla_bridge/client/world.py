@@ -56,19 +56,19 @@ class CarlaWorld(EpisodeWorld[Episode]):
 
     def _connected(self) -> Connection:
         """A connection to a world without anything of ours."""
-        connection, self._connection, self._episode = self._connection, None, None
+        connection, self._episode = self._connection, None
         if connection is not None and connection.is_alive():
             with connection.answers():
                 connection.clear()
         else:
+            self._connection = None
             if connection is not None and connection.has_manager:
                 # It would be stepped together with the next server's, miss its own, and abort this process.
                 raise RuntimeError(
                     f"found that the server at {self._host}:{self._port} has gone while CARLA's traffic manager drove "
                     "cars there, wanted the same one: start it again, and type this again; what is done is kept"
                 )
-            connection = Connection(self._host, self._port)
-        self._connection = connection
+            connection = self._connection = Connection(self._host, self._port)
         connection.synchronise()
         return connection
 

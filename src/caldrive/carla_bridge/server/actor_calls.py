@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from caldrive.carla_bridge.axes import Placement, compose
-from caldrive.carla_bridge.server.actors import Actor, ActorLayout, Prop, box_of
+from caldrive.carla_bridge.server.actors import OFF_GROUND, Actor, ActorLayout, Prop, box_of, is_on_ground
 from caldrive.carla_bridge.server.blueprints import BLUEPRINTS, REFUSED, SIZES, VOLUME
 from caldrive.carla_bridge.server.calls import call
-from caldrive.carla_bridge.server.episode import PERSON_BOX, is_on_ground
+from caldrive.carla_bridge.server.episode import PERSON_BOX
 from caldrive.carla_bridge.server.friction import volume
 from caldrive.carla_bridge.server.layouts import ActorDescription, BoundingBox, Transform, Vector, placement
 from caldrive.carla_bridge.server.sensor_actors import SensorActor, checked
@@ -106,7 +106,8 @@ class ActorCalls:
         world = compose(carrier.place, at) if carrier else at
         if kind.startswith("walker."):
             self._require_room(world, 2 * RADIUS, 2 * RADIUS)
-            return Walker(0, asked, Placement(world.x, world.y, UP, world.heading), box=PERSON_BOX, before=world.pose)
+            z = world.z if world.z <= -OFF_GROUND else UP
+            return Walker(0, asked, Placement(world.x, world.y, z, world.heading), box=PERSON_BOX, before=world.pose)
         if kind == VOLUME:
             return volume(asked, at)
         length, width, height = SIZES[kind]

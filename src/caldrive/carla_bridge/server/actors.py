@@ -11,6 +11,7 @@ from caldrive.carla_bridge.server.layouts import ActorDescription, AttributeValu
 from caldrive.carla_bridge.server.snapshot import NOTHING, Triple
 
 STILL: tuple[Triple, Triple, Triple] = (NOTHING, NOTHING, NOTHING)
+OFF_GROUND = 5.0  # m above or below the ground, from which on nothing is met
 NOBODY = 0  # the owner of what is there from the beginning
 ActorLayout = tuple[int, int, ActorDescription, BoundingBox, bytes, bytes]
 
@@ -71,6 +72,11 @@ class Actor:
         return compose(self.parent.place, self.own_place) if self.parent else self.own_place
 
     @property
+    def is_aside(self) -> bool:
+        """Whether a program has put it far below the ground, where it waits to be needed."""
+        return self.own_place.z <= -OFF_GROUND
+
+    @property
     def depth(self) -> int:
         """How many actors it is attached to in a row."""
         return self.parent.depth + 1 if self.parent else 0
@@ -86,6 +92,11 @@ class Actor:
         return self.id, self.parent.id if self.parent else 0, self.description, self.box, tags, token
 
 
+def is_on_ground(place: Placement) -> bool:
+    """Whether something meets what is in the town."""
+    return abs(place.z) < OFF_GROUND
+
+
 def box_of(size: Sequence[float], up: float) -> BoundingBox:
     """A box of a length, width and height in m, whose middle is so far above its actor's origin."""
     length, width, height = size
@@ -95,6 +106,14 @@ def box_of(size: Sequence[float], up: float) -> BoundingBox:
 def description(id: str, **attributes: str) -> ActorDescription:
     """Of an actor that no client asked for."""
     return ActorDescription(0, id, tuple(AttributeValue(name, 4, value) for name, value in attributes.items()))
+
+
+@dataclass(eq=False)
+class NativeCar(Actor):
+    """A car of the town's own, which SUMO drives."""
+
+    limit: float = 30.0
+    """km/h, the lawful one where it is."""
 
 
 @dataclass(eq=False)

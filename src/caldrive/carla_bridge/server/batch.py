@@ -67,7 +67,7 @@ class Batches:
         """A command; future: the actor that is meant by number 0. Raises Refusal."""
         match command:
             case [[0, payload]] if depth < DEEPEST:
-                return self._spawn(caller, converted(payload, Spawn, "a spawn command"), depth)
+                return self._spawn(caller, converted(payload, Spawn, "a spawn command"), future, depth)
             case [[int(index), [int(number), *rest]]] if index in self._commands:
                 method, kind = self._commands[index]
                 number = number or future
@@ -75,8 +75,12 @@ class Batches:
                 return number
         raise Refusal("found a command that caldrive does not know, wanted one of CARLA 0.9.16: leave it out")
 
-    def _spawn(self, caller: int, asked: Spawn, depth: int) -> int:
-        parent = int(asked.parent[1]) if asked.parent[:1] == (True,) and len(asked.parent) > 1 else None
+    def _spawn(self, caller: int, asked: Spawn, future: int, depth: int) -> int:
+        parent = (int(asked.parent[1]) or future) if asked.parent[:1] == (True,) and len(asked.parent) > 1 else None
+        if parent == 0:
+            raise Refusal(
+                f"found FutureActor as what {asked.description.id[:80]} is attached to, wanted it in a then()"
+            )
         actor = self._actors.spawn(caller, asked.description, placement(asked.transform), parent)
         for command in asked.then:
             with suppress(Refusal):  # the actor is there, and its client has to know

@@ -69,18 +69,33 @@ WITH_LIGHTS = {
     *(row[0] for row in CARS_2),
 }  # fmt: skip
 PAINTS = ["180,44,44", "42,78,154", "230,230,226", "43,45,49"]
-N_WALKERS = 30
-PROPS = (
-    ("static.prop.trafficcone01", 0.4, 0.4, 0.7), ("static.prop.streetbarrier", 0.4, 1.2, 1.1),
-    ("static.prop.box01", 0.6, 0.6, 0.5), ("static.prop.container", 2.4, 1.6, 1.6),
-    ("static.prop.bin", 0.6, 0.6, 1.0), ("static.prop.bench01", 0.6, 1.6, 0.9),
-    ("static.prop.constructioncone", 0.4, 0.4, 0.6), ("static.prop.dirtdebris01", 2.4, 1.5, 0.1),
-    ("static.prop.warningconstruction", 0.4, 1.2, 1.1), ("static.prop.trafficwarning", 2.8, 2.4, 3.5),
-)  # fmt: skip
+N_WALKERS = 52
+_PROPS = {  # names by about their sizes
+    (0.4, 0.4, 0.7): "trafficcone01 trafficcone02", (0.4, 0.4, 0.6): "constructioncone",
+    (0.4, 1.2, 1.1): "streetbarrier warningconstruction", (0.1, 1.5, 0.9): "chainbarrier",
+    (0.1, 0.1, 0.9): "chainbarrierend", (0.4, 0.9, 1.0): "warningaccident", (2.8, 2.4, 3.5): "trafficwarning",
+    (1.2, 2.4, 0.1): "ironplank", (2.4, 1.5, 0.1): "dirtdebris01", (1.8, 1.5, 0.1): "dirtdebris02",
+    (1.5, 1.2, 0.1): "dirtdebris03", (0.6, 0.6, 0.9): "barrel",
+    (0.6, 0.6, 1.0): "bin trashcan01 trashcan02 trashcan03 trashcan04 trashcan05", (2.4, 1.6, 1.6): "container",
+    (1.2, 1.2, 1.8): "clothcontainer", (1.5, 1.5, 1.8): "glasscontainer", (0.6, 0.6, 0.5): "box01",
+    (0.5, 0.5, 0.4): "box02", (0.4, 0.4, 0.3): "box03", (0.5, 0.5, 0.5): "trashbag",
+    (2.0, 1.2, 1.2): "platformgarbage01", (0.6, 1.6, 0.9): "bench01 bench02 bench03", (1.6, 1.6, 0.8): "table",
+    (0.9, 0.9, 0.7): "plastictable", (0.5, 0.5, 0.9): "plasticchair", (1.5, 4.0, 2.6): "busstop busstoplb",
+    (2.5, 2.5, 2.8): "kiosk_01", (1.5, 2.5, 2.3): "foodcart", (0.8, 1.0, 1.9): "vendingmachine",
+    (0.8, 0.9, 1.6): "atm", (0.5, 0.5, 1.2): "mailbox", (0.3, 1.4, 2.4): "advertisement",
+    (0.1, 0.7, 2.5): "streetsign streetsign01 streetsign04", (0.5, 0.5, 1.0): "streetfountain",
+    (4.0, 4.0, 2.0): "fountain", (0.8, 0.8, 0.9): "plantpot01 plantpot02 plantpot03",
+    (0.5, 0.5, 0.6): "plantpot04 plantpot05 plantpot06 plantpot07 plantpot08", (1.0, 0.6, 1.0): "shoppingcart",
+    (0.4, 0.4, 1.0): "shoppingtrolley", (0.5, 0.2, 0.4): "briefcase", (0.5, 0.3, 0.7): "travelcase",
+    (0.4, 1.1, 0.2): "guitarcase", (1.2, 1.2, 1.2): "haybale haybalelb",
+}  # fmt: skip
+PROPS: dict[str, Size] = {f"static.prop.{name}": size for size, names in _PROPS.items() for name in names.split()}
 CAMERAS = ("rgb", "depth", "semantic_segmentation", "instance_segmentation")
-NOT_DRAWN = ("dvs", "optical_flow", "normals")
+NOT_DRAWN = ("dvs", "optical_flow", "normals", "cosmos_visualization")
 VOLUME = "static.trigger.friction"
-REFUSED = (*(f"sensor.camera.{kind}" for kind in NOT_DRAWN), "sensor.other.rss")
+REFUSED = (
+    *(f"sensor.camera.{kind}" for kind in NOT_DRAWN), "sensor.other.rss", "sensor.other.v2x", "sensor.other.v2x_custom",
+)  # fmt: skip
 _LENS = {
     "lens_circle_falloff": "5.0", "lens_circle_multiplier": "0.0", "lens_k": "-1.0", "lens_kcube": "0.0",
     "lens_x_size": "0.08", "lens_y_size": "0.08",
@@ -160,6 +175,8 @@ _SENSORS: dict[str, dict[str, str]] = {
         "horizontal_fov": "360.0",
     },
     "sensor.other.rss": {},
+    **{f"sensor.other.{kind}": {"transmit_power": "21.5", "receiver_sensitivity": "-99.0", "frequency_ghz": "5.9"}
+       for kind in ("v2x", "v2x_custom")},
     "sensor.lidar.ray_cast": {
         "range": "10.0", "rotation_frequency": "10.0", "upper_fov": "10.0", "lower_fov": "-30.0",
         "horizontal_fov": "360.0", "atmosphere_attenuation_rate": "0.004", "dropoff_general_rate": "0.45",
@@ -195,7 +212,7 @@ def _all() -> dict[str, list[Attribute]]:
     found["controller.ai.walker"] = _names("default")
     found |= {f"sensor.camera.{kind}": _camera(kind) for kind in (*CAMERAS, *NOT_DRAWN)}
     found |= {id: _sensor(id) for id in _SENSORS}
-    found |= {id: _names("prop") for id, *_ in PROPS}
+    found |= {id: _names("prop") for id in PROPS}
     found[VOLUME] = [*_names("trigger"), *_floats({"friction": "3.5", **{f"extent_{axis}": "100.0" for axis in "xyz"}})]
     return found
 
@@ -208,5 +225,5 @@ def usual_attributes(id: str) -> dict[str, str]:
 BLUEPRINTS = {id: Blueprint(uid, id, tuple(rows)) for uid, (id, rows) in enumerate(_all().items(), 1)}
 SIZES: dict[str, Size] = {
     **{f"vehicle.{row[0]}": row[1:] for row in (*CARS_1, *CARS_2, *TRUCKS, *VANS, *BUSES, *MOTORCYCLES, *BICYCLES)},
-    **{row[0]: row[1:] for row in PROPS},
+    **PROPS,
 }

@@ -1,4 +1,7 @@
-"""The connections that make calls: what comes is answered in its order, one connection after the other."""
+"""The connections that make calls: what comes is answered in its order, one connection after the other.
+
+A connection is a client from its first call on: who only connects, as what looks for open ports does, changes nothing.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from caldrive.carla_bridge.server.outbox import Gone, Log, Outbox, accepted
+from caldrive.carla_bridge.server.log import Log
+from caldrive.carla_bridge.server.outbox import Gone, Outbox, accepted
 from caldrive.carla_bridge.server.wire import BrokenMessage, Request, Requests, answer
 
 RECEIVED = 2**18  # bytes that are read at once
 MOST_CLIENTS = 128
+MOST_ASKED = 1000  # calls that a client may be ahead of its answers; the next wait in its socket
 MOST_UNREAD = 64_000_000  # bytes of answers that a client may leave unread
 
 
@@ -29,6 +34,7 @@ class Client:
     requests: Requests = field(default_factory=Requests)
     asked: deque[Request] = field(default_factory=deque)
     """What it waits for an answer to."""
+    has_called: bool = False
 
 
 class Clients:
@@ -45,8 +51,8 @@ class Clients:
         self._selector.register(waiting, selectors.EVENT_READ)
 
     def __len__(self) -> int:
-        """How many there are."""
-        return len(self._clients)
+        """How many have called."""
+        return sum(client.has_called for client in self._clients.values())
 
     def fileno(self) -> int:
         """For whoever waits until something happens here."""
@@ -63,9 +69,12 @@ class Clients:
     def _let_in(self) -> None:
         while (connection := accepted(self._waiting)) is not None:
             if len(self._clients) >= MOST_CLIENTS:
-                self._log(f"a client was turned away, as there are {MOST_CLIENTS}")
-                connection.close()
-                continue
+                silent = next((one for one in self._clients.values() if not one.has_called), None)
+                if silent is None:
+                    self._log.rarely("a client was turned away", f"as there are {MOST_CLIENTS}")
+                    connection.close()
+                    continue
+                self._let_go(silent)
             client = Client(self._next, connection, Outbox(connection))
             self._next += 1
             self._clients[client.number] = client
@@ -76,7 +85,7 @@ class Clients:
         with self._while_it_lasts(client):
             if events & selectors.EVENT_WRITE:
                 client.outbox.flush()
-            if events & selectors.EVENT_READ:
+            if events & selectors.EVENT_READ and len(client.asked) < MOST_ASKED:
                 self._hear(client)
             self._watch(client)
 
@@ -89,7 +98,9 @@ class Clients:
             raise Gone from error
         if not received:
             raise Gone
-        client.asked += client.requests.feed(received)
+        for request in client.requests.feed(received):
+            client.asked.append(request)
+            client.has_called = True
 
     @property
     def is_busy(self) -> bool:
@@ -126,14 +137,15 @@ class Clients:
         except Gone:
             self._let_go(client)
         except BrokenMessage as error:
-            self._log(f"a client was cut off ({error}), wanted calls of CARLA 0.9.16: use its client")
+            self._log.rarely("a client was cut off", f"{error}; wanted calls of CARLA 0.9.16: use its client")
             self._let_go(client)
 
     def _let_go(self, client: Client) -> None:
         self._selector.unregister(client.socket)
         client.socket.close()
         del self._clients[client.number]
-        self._gone(client.number)
+        if client.has_called:
+            self._gone(client.number)
 
     def close(self) -> None:
         """Ends all of them."""

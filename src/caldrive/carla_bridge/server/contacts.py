@@ -7,10 +7,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+import shapely
+
 from caldrive.carla_bridge.server.actors import Actor
 from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.datatypes import Contact, ContactKind, PedestrianState, Pose, VehicleState
-from caldrive.geometry import box_corners, boxes_overlap
+from caldrive.geometry import box_corners, boxes_overlap, moved, push_out
 from caldrive.world.town import Obstacles
 from caldrive.world.traffic.collisions import Obstacle, half_diagonal, obstacle_of, resolve
 
@@ -23,6 +26,8 @@ class Hit(NamedTuple):
 
     vehicle: Vehicle
     contact: Contact
+    impulse: tuple[float, float]
+    """N s that act on the vehicle, in the world, in our axes."""
 
 
 def prop_box(prop: Actor) -> Obstacle:
@@ -40,13 +45,24 @@ def resolve_contacts(
     for vehicle in vehicles:
         if not (vehicle.collides and vehicle.has_physics):
             continue
-        box = vehicle.box_state()
+        start = box = vehicle.box_state()
         near = _near(box, [one for one in bodies if one.id != box.id], things, town)
-        after, contacts = resolve(box, near)
-        if contacts:
-            vehicle.state = replace(vehicle.state, pose=after.pose, speed=after.speed)
-            hits += [Hit(vehicle, contact) for contact in contacts]
+        for thing in near:
+            before, (box, contacts) = box, resolve(box, [thing])
+            hits += [Hit(vehicle, contact, _impulse(before, thing, contact.impulse)) for contact in contacts]
+        if box is not start:
+            vehicle.state = replace(vehicle.state, pose=box.pose, speed=box.speed)
     return hits
+
+
+def _impulse(box: VehicleState, thing: Obstacle, size: float) -> tuple[float, float]:
+    """An impulse that pushes a box out of something the shortest way."""
+    corners = box_corners(thing.pose, thing.length, thing.width)
+    shift = push_out(moving=box_corners(box.pose, box.length, box.width), fixed=corners)
+    if shift is None:
+        return 0.0, 0.0
+    x, y = (size * shift / np.linalg.norm(shift)).tolist()
+    return x, y
 
 
 def _near(box: VehicleState, bodies: Iterable[Body], things: Iterable[Obstacle], town: Obstacles) -> list[Obstacle]:
@@ -68,16 +84,17 @@ def is_free(box: VehicleState, bodies: Iterable[Body], props: Iterable[Actor], t
 
 
 def way_ahead(pose: Pose, distance: float, radius: float, near: Iterable[Obstacle]) -> tuple[Obstacle, float] | None:
-    """What stands first within a distance (m) ahead of a place and so far to its sides, and how far away it is."""
+    """What stands first within a distance (m) ahead of a place and so far around the line there, and how far away its
+    nearest point of that space is."""
     best: tuple[Obstacle, float] | None = None
-    c, s = math.cos(pose.heading), math.sin(pose.heading)
-    middle = Pose(pose.x + c * distance / 2, pose.y + s * distance / 2, pose.heading)
-    corridor = box_corners(middle, distance, 2 * radius)
+    ahead = moved(pose, forward=distance)
+    start, line = shapely.Point(pose.x, pose.y), shapely.LineString(((pose.x, pose.y), (ahead.x, ahead.y)))
+    capsule = line.buffer(radius)
     for one in near:
-        corners = box_corners(one.pose, one.length, one.width)
-        if not boxes_overlap(corridor, corners):
+        if not _is_near(one.pose, pose, distance + radius + half_diagonal(one)):
             continue
-        away = max(0.0, float(((corners - (pose.x, pose.y)) @ (c, s)).min()))
-        if best is None or away < best[1]:
+        part = capsule.intersection(shapely.Polygon(box_corners(one.pose, one.length, one.width)))
+        away = math.inf if part.is_empty else start.distance(part)
+        if away <= distance and (best is None or away < best[1]):
             best = one, away
     return best

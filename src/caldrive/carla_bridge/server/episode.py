@@ -10,7 +10,7 @@ import shapely
 
 from caldrive.carla_bridge.axes import Placement, standing, vector_to_carla
 from caldrive.carla_bridge.server import snapshot
-from caldrive.carla_bridge.server.actors import Actor, Prop, box_of, description
+from caldrive.carla_bridge.server.actors import Actor, NativeCar, Prop, box_of, description, is_on_ground
 from caldrive.carla_bridge.server.blueprints import N_WALKERS, usual_attributes
 from caldrive.carla_bridge.server.contacts import Hit, is_free, resolve_contacts
 from caldrive.carla_bridge.server.friction import FrictionVolume, friction_at
@@ -33,7 +33,7 @@ from caldrive.world.town import Town
 LOOK_AT_LIMITS = 10  # steps from one look at the limit under a vehicle to the next
 NATIVE_CARS = {4.2: "vehicle.seat.leon", 4.6: "vehicle.tesla.model3", 4.9: "vehicle.volkswagen.t2"}  # by their length
 NATIVE_HEIGHT = 1.5  # m
-OFF_GROUND = 5.0  # m above or below the ground, from which on nothing is met
+GRAVITY = 9.81  # m/s²
 PERSON_BOX = BoundingBox(Vector(), Vector(RADIUS, RADIUS, HEIGHT / 2))
 Kind = TypeVar("Kind", bound=Actor)
 
@@ -47,6 +47,8 @@ class Episode:
     ) -> None:
         self.number, self.town, self.time, self.delta = number, town, 0.0, 0.0
         self.hits: list[Hit] = []
+        self.gravity = GRAVITY
+        """m/s² that IMUs feel."""
         self.has_changed = False
         """Whether actors came or went since the last snapshot."""
         self._steps, self._numbers = 0, numbers
@@ -121,21 +123,22 @@ class Episode:
             vehicle.step(delta)
         for walker in walkers:
             walker.step(delta)
-        self._population.move_to(self.time, self._vehicle_states(), self._walker_states())
+        self._population.move_to(self.time, self.vehicle_states(), self.walker_states())
         self._take_down()
         there = [one for one in vehicles if is_on_ground(one.place)]
         self.hits = resolve_contacts(there, self.bodies(), self.props(), self.town.obstacles)
         for vehicle, state in zip(vehicles, before, strict=True):
             vehicle.note_motion(state, delta)
         if self._steps % LOOK_AT_LIMITS == 1:
-            for vehicle in vehicles:
-                vehicle.limit = self._limit_at(vehicle)
+            known: list[Vehicle | NativeCar] = [*vehicles, *self.all(NativeCar)]
+            for one in known:
+                one.limit = self._limit_at(one)
 
-    def _limit_at(self, vehicle: Vehicle) -> float:
+    def _limit_at(self, one: Vehicle | NativeCar) -> float:
         try:
-            return self.town.roads.lane_at(vehicle.state.pose)[0].limit
+            return self.town.roads.lane_at(one.place.pose)[0].limit
         except ValueError:  # beside the road the last one goes on
-            return vehicle.limit
+            return one.limit
 
     def _take_down(self) -> None:
         """Takes down who is where now."""
@@ -147,18 +150,19 @@ class Episode:
         for k, person in enumerate(self.people):
             actor = self._native(person, f"walker.pedestrian.{1 + k % N_WALKERS:04}")
             actor.own_place = standing(person.pose, UP)
-        there = [*self.cars, *(one.box_state() for one in self.all(Vehicle))]
+        there = [*self.cars, *self.vehicle_states()]
         ids = [actor.id for actor in map(self.actor_of, (car.id for car in there)) if actor]
         self._at_light = dict(zip(ids, self.lights.before([car.pose for car in there]), strict=True))
 
     def _native(self, body: VehicleState | PedestrianState, kind: str) -> Actor:
         """The actor of one of the inhabitants, as it moves now."""
         if body.id not in self._natives:
-            box = PERSON_BOX
+            about = description(kind, **usual_attributes(kind) | {"role_name": "autopilot"})
+            actor = Actor(next(self._numbers), about, standing(body.pose), box=PERSON_BOX)
             if isinstance(body, VehicleState):
                 box = box_of((body.length, body.width, NATIVE_HEIGHT), NATIVE_HEIGHT / 2)
-            about = description(kind, **usual_attributes(kind) | {"role_name": "autopilot"})
-            actor = Actor(next(self._numbers), about, Placement(), box=box)
+                actor = NativeCar(actor.id, about, actor.own_place, box=box)
+                actor.limit = self._limit_at(actor)
             self._natives[body.id] = self._actors[actor.id] = actor
             self._by_kind.clear()
         actor = self._natives[body.id]
@@ -166,14 +170,16 @@ class Episode:
         actor.motion = (vector_to_carla(body.speed * c, body.speed * s), NOTHING, NOTHING)
         return actor
 
-    def _walker_states(self) -> list[PedestrianState]:
+    def walker_states(self) -> list[PedestrianState]:
+        """The clients' walkers, as the embedded world knows people."""
         return [
             one.state(bool(shapely.contains_xy(self.town.roads.roadway, one.own_place.x, one.own_place.y)))
             for one in self.all(Walker)
             if is_on_ground(one.own_place)
         ]
 
-    def _vehicle_states(self, but: int = 0) -> list[VehicleState]:
+    def vehicle_states(self, but: int = 0) -> list[VehicleState]:
+        """Likewise their vehicles, but one."""
         return [one.box_state() for one in self.all(Vehicle) if one.id != but and is_on_ground(one.place)]
 
     def props(self) -> list[Prop]:
@@ -182,14 +188,14 @@ class Episode:
 
     def bodies(self) -> list[VehicleState | PedestrianState]:
         """Everybody who moves."""
-        return [*self.cars, *self.people, *self._vehicle_states(), *self._walker_states()]
+        return [*self.cars, *self.people, *self.vehicle_states(), *self.walker_states()]
 
     def scene(self, camera: Placement, carrier: Actor | None) -> SceneState:
         """What a camera may see; not the vehicle that carries it, where the camera is inside its box."""
         own = carrier.id if isinstance(carrier, Vehicle) and _is_inside(carrier, camera) else 0
-        here, vehicles = VehicleState(camera.pose), [*self.cars, *self._vehicle_states(but=own)]
+        here, vehicles = VehicleState(camera.pose), [*self.cars, *self.vehicle_states(but=own)]
         lights = {one.post.id: one.state for one in self.lights.actors}
-        people = [*self.people, *self._walker_states()]
+        people = [*self.people, *self.walker_states()]
         return SceneState(self.drawn_weather, here, vehicles, people, lights, self.time)
 
     def snapshot(self, frame: int) -> bytes:
@@ -218,11 +224,11 @@ class Episode:
         """What an actor's kind adds to its row."""
         if isinstance(actor, Light):
             return self.lights.part(actor, self.time)
-        if actor.kind.startswith("vehicle."):
+        if isinstance(actor, Vehicle | NativeCar):
             light = self._at_light.get(actor.id)
             at = (NUMBERS[light.state], light.id) if light else None
-            control, limit = (actor.control, actor.limit) if isinstance(actor, Vehicle) else (VehicleControl(), 30.0)
-            return snapshot.vehicle_part(control, limit, at)
+            control = actor.control if isinstance(actor, Vehicle) else VehicleControl()
+            return snapshot.vehicle_part(control, actor.limit, at)
         if isinstance(actor, Walker):
             return snapshot.walker_part(actor.control)
         return snapshot.sign_part(actor.sign) if actor.sign else b""
@@ -230,11 +236,6 @@ class Episode:
     def close(self) -> None:
         """Ends the traffic."""
         self._population.close()
-
-
-def is_on_ground(place: Placement) -> bool:
-    """Whether something meets what is in the town: programs put aside far below or above it what they need later."""
-    return abs(place.z) < OFF_GROUND
 
 
 def _is_inside(vehicle: Vehicle, camera: Placement) -> bool:

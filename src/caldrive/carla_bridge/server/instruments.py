@@ -14,10 +14,10 @@ from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import BoundingBox
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor, reach_of
 from caldrive.carla_bridge.server.snapshot import Sensor
+from caldrive.carla_bridge.server.vehicles import Vehicle
 from caldrive.world.traffic.collisions import obstacle_of
 
 EARTH = 0.9996 * 6_378_137.0  # m, the radius by which CARLA's client turns places into degrees (it scales by UTM's)
-GRAVITY = 9.81  # m/s²
 
 
 def geo_location(place: Placement) -> tuple[float, float, float]:
@@ -40,17 +40,18 @@ def imu(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message
     ahead, right = c * acceleration[0] + s * acceleration[1], c * acceleration[1] - s * acceleration[0]
     gyro = tuple(math.radians(rate) for rate in turning)
     compass = math.radians((yaw + 90.0) % 360.0)
-    yield Sensor.IMU, [wire.encode(((ahead, right, acceleration[2] + GRAVITY), gyro, compass))]
+    yield Sensor.IMU, [wire.encode(((ahead, right, acceleration[2] + episode.gravity), gyro, compass))]
 
 
 def collisions(sensor: SensorActor, episode: Episode) -> Iterator[tuple[Sensor, Message]]:
-    """A message for each new contact of its vehicle."""
-    for vehicle, contact in episode.hits:
-        if vehicle is not sensor.parent:
-            continue
-        heading = vehicle.state.pose.heading
-        impulse = (-contact.impulse * math.cos(heading), contact.impulse * math.sin(heading), 0.0)
-        yield Sensor.COLLISION, [wire.encode((vehicle.layout(b""), _other(contact.id, episode), impulse))]
+    """A message for each contact of its carrier, with the impulse on it (N s, CARLA's axes): a vehicle's own ones, and
+    those of the vehicles that run into somebody on foot or into a car of SUMO's."""
+    own = sensor.parent
+    for vehicle, contact, (x, y) in episode.hits:
+        if vehicle is own:
+            yield Sensor.COLLISION, [wire.encode((own.layout(b""), _other(contact.id, episode), (x, -y, 0.0)))]
+        elif own and not isinstance(own, Vehicle) and episode.actor_of(contact.id) is own:
+            yield Sensor.COLLISION, [wire.encode((own.layout(b""), vehicle.layout(b""), (-x, y, 0.0)))]
 
 
 def _other(name: str, episode: Episode) -> Any:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from caldrive.carla_bridge.server.actor_calls import ActorCalls, finite
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.layouts import BoundingBox, Vector
-from caldrive.carla_bridge.server.lights import OFF, STATES, Light, LightKeeper
+from caldrive.carla_bridge.server.lights import STATES, Light, LightKeeper
 from caldrive.carla_bridge.server.server import Server
+from caldrive.carla_bridge.server.wire import Refusal
 
 MOST_TIME = 1e6  # s that a light may show the same
 
@@ -26,12 +27,13 @@ class LightCalls:
 
     @call("set_traffic_light_state")
     def set_light(self, caller: int, number: int, state: int) -> None:
-        """It shows that as long as it lasts; a light that is off, or unknown, does as it would alone."""
-        light, time = self._light(number), self._server.episode.time
-        if state >= OFF:
-            self._keeper.release([light], time)
-        elif state in STATES:
-            self._keeper.hold(light, STATES[state], time)
+        """It shows that as long as it lasts. Raises Refusal for a light that is off, as ours always show something."""
+        light = self._light(number)
+        if state not in STATES:
+            raise Refusal(
+                f"found state {state} of a light, as of one that is off, wanted Red, Yellow or Green: set one"
+            )
+        self._keeper.hold(light, STATES[state], self._server.episode.time)
 
     def _set_time(self, number: int, place: int, seconds: float) -> None:
         light = self._light(number)

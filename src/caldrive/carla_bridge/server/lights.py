@@ -19,7 +19,6 @@ from caldrive.world.traffic.traffic_lights import TrafficLights
 
 NUMBERS = {LightState.RED: 0, LightState.YELLOW: 1, LightState.GREEN: 2}
 STATES = {number: state for state, number in NUMBERS.items()}
-OFF = 3  # and above: a light that shows nothing; ours always show something
 USUAL_TIMES: Triple = (10.0, 3.0, 2.0)  # s of green, yellow, red that a client's state lasts
 TRIGGER = 2.5  # m: half the length of a trigger volume, which ends at the stop line
 ZONE = 12.0  # m before a stop line within which a vehicle is at the light

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import socket
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from typing import Any
 
-Log = Callable[[str], None]
+KEEPALIVE = {  # s of silence before the first probe, s between two, and how many stay unanswered before the end
+    socket.TCP_KEEPIDLE: 30, socket.TCP_KEEPINTVL: 10, socket.TCP_KEEPCNT: 3,
+}  # fmt: skip
 AT_ONCE = 16  # pieces that are handed to the system together
 
 
@@ -72,4 +74,7 @@ def accepted(waiting: socket.socket) -> socket.socket | None:
         return None
     stream.setblocking(False)
     stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    stream.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # of a machine that vanished nothing is heard
+    for option, value in KEEPALIVE.items():
+        stream.setsockopt(socket.IPPROTO_TCP, option, value)
     return stream

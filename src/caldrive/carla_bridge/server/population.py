@@ -15,7 +15,9 @@ import numpy as np
 from caldrive.datatypes import DT, PedestrianState, Pose, VehicleState
 from caldrive.geometry import boxes_of, wrap_angle
 from caldrive.world.roads.network import RoadNetwork
+from caldrive.world.traffic import sidewalks
 from caldrive.world.traffic.pedestrians import Pedestrians
+from caldrive.world.traffic.start_places import free_places
 from caldrive.world.traffic.traffic_lights import TrafficLights
 from caldrive.world.traffic.vehicles import Traffic
 
@@ -68,6 +70,12 @@ class Population:
         """Ends the simulation of the cars."""
         if self._traffic is not None:
             self._traffic.close()
+
+
+def require_room(roads: RoadNetwork, cars: int, people: int) -> None:
+    """Raises ValueError for more cars or people than there is room for."""
+    sidewalks.require_room(roads, people)
+    free_places(roads, cars, None)
 
 
 def _between(before: Sequence[Moving], after: Sequence[Moving], share: float) -> Iterator[Moving]:

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from caldrive.carla_bridge.server.actors import NOBODY, Actor
 from caldrive.carla_bridge.server.episode import Episode
+from caldrive.carla_bridge.server.log import Log
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
-from caldrive.carla_bridge.server.vehicles import Vehicle
-from caldrive.carla_bridge.server.walkers import Walker
 from caldrive.datatypes import LightState
 from caldrive.visualization.channels import Content, Picture, Remark, Writer, as_jpeg
 from caldrive.visualization.scenes import lights_scene, others_scene, town_scene
@@ -19,14 +18,27 @@ class RunRecording:
     """Tells a writer of a server's episodes, which follow one another in the recording's time, from 0 s on."""
 
     def __init__(self, writer: Writer) -> None:
-        self._writer, self._now = writer, 0.0
+        self._writer, self._now, self._is_full = writer, 0.0, False
         self._episode: Episode | None = None
         self._begin = 0.0  # s of the recording at which the episode began
         self._clients: dict[int, str] = {}  # their actors, by number
         self._lights: list[tuple[str, LightState]] = []
 
-    def step(self, episode: Episode, heard: Sequence[tuple[SensorActor, Message]]) -> None:
-        """The world has moved. heard: what sensors said; pictures of RGB cameras are kept."""
+    def step(self, episode: Episode, heard: Sequence[tuple[SensorActor, Message]], log: Log) -> None:
+        """The world has moved. heard: what sensors said; pictures of RGB cameras are kept. A full disk ends the
+        recording, and nothing else."""
+        if self._is_full:
+            return
+        try:
+            self._take_down(episode, heard)
+        except OSError as error:
+            log(
+                f"found that {error.filename} cannot be written any more ({error.strerror}), wanted room: what was "
+                "recorded until now is there, and all goes on without a recording"
+            )
+            self._is_full = True
+
+    def _take_down(self, episode: Episode, heard: Sequence[tuple[SensorActor, Message]]) -> None:
         if episode is not self._episode:
             self._write(self._beginning(episode))
         self._now = self._begin + episode.time
@@ -50,9 +62,8 @@ class RunRecording:
 
     def _messages(self, episode: Episode) -> Iterator[tuple[str, Content]]:
         """What a step says."""
-        vehicles, walkers = episode.all(Vehicle), episode.all(Walker)
         yield "/inhabitants", others_scene(episode.cars, episode.people)
-        yield "/clients", others_scene((one.box_state() for one in vehicles), (one.state(False) for one in walkers))
+        yield "/clients", others_scene(episode.vehicle_states(), episode.walker_states())
         lights = episode.lights.shown()
         states = [(light.id, light.state) for light in lights]
         if states != self._lights:  # they rarely change
@@ -60,7 +71,7 @@ class RunRecording:
             yield "/lights", lights_scene(lights)
         for text in self._changes(episode):
             yield "/log", Remark("info", text)
-        for vehicle, contact in episode.hits:
+        for vehicle, contact, _ in episode.hits:
             yield "/log", Remark("warning", f"{name(vehicle)} hits {contact.id} with {contact.impulse:.0f} kg m/s")
 
     def _changes(self, episode: Episode) -> Iterator[str]:

@@ -15,7 +15,7 @@ from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.instances import Body, Pictures, instances, semantic_scan, with_cosines
 from caldrive.carla_bridge.server.instruments import collisions, gnss, imu, obstacle
 from caldrive.carla_bridge.server.lidar import Rays, lidar_settings, scan
-from caldrive.carla_bridge.server.outbox import Log
+from caldrive.carla_bridge.server.log import Log
 from caldrive.carla_bridge.server.radar import detections, radar_settings
 from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
 from caldrive.carla_bridge.server.snapshot import Sensor, header

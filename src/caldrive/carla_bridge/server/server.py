@@ -7,9 +7,8 @@ world stands at its beginning, so that a program that comes alone finds the same
 from __future__ import annotations
 
 import selectors
-import sys
 from collections.abc import Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -18,15 +17,17 @@ from caldrive.carla_bridge.server.calls import Call, serve, turned_down
 from caldrive.carla_bridge.server.clients import Clients
 from caldrive.carla_bridge.server.episode import Episode
 from caldrive.carla_bridge.server.layouts import Settings
+from caldrive.carla_bridge.server.log import Log, Refusals
 from caldrive.carla_bridge.server.maps import Maps, signal_ids
 from caldrive.carla_bridge.server.outbox import listening
 from caldrive.carla_bridge.server.pace import FREE_STEP, Pace
-from caldrive.carla_bridge.server.sensor_actors import Message, SensorActor
+from caldrive.carla_bridge.server.population import require_room
+from caldrive.carla_bridge.server.sensor_actors import SensorActor
 from caldrive.carla_bridge.server.sensors import Senses
 from caldrive.carla_bridge.server.settings import ServerSettings
 from caldrive.carla_bridge.server.streams import WORLD, Streams
 from caldrive.carla_bridge.server.wire import Request
-from caldrive.world.town import load_town
+from caldrive.world.town import Town, load_town
 
 if TYPE_CHECKING:  # it needs what draws
     from caldrive.carla_bridge.server.run_recording import RunRecording
@@ -41,6 +42,8 @@ class Server:
 
     def __init__(self, settings: ServerSettings, recording: RunRecording | None = None) -> None:
         self.settings, self.maps, self._recording = settings, Maps(settings.maps), recording
+        self.log = Log()
+        self._refusals = Refusals(self.log)
         self._rules: dict[int, Settings] = {}  # of the clients that set some, the latest last
         self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
         self.managers: dict[int, tuple[str, int]] = {}
@@ -56,47 +59,50 @@ class Server:
             self._selector = stack.enter_context(selectors.DefaultSelector())
             for one in (self.clients, self.streams):
                 self._selector.register(one, selectors.EVENT_READ, one.poll)
-            self._senses = Senses(load_town(settings.town))
+            town = self._suitable(settings.town)
+            self._senses = Senses(town)
             stack.callback(lambda: self._senses.close())
-            self.episode = self._begin(settings.town)
+            self.episode = self._begin(town)
             stack.callback(lambda: self.episode.close())
             self._latest = self.episode.snapshot(self.frame)
             self.close = stack.pop_all().close
             """Ends it all."""
 
-    def log(self, sentence: str) -> None:
-        """Says something on stderr, if anybody can hear it."""
-        with suppress(OSError, ValueError):
-            print(f"caldrive: {sentence}", file=sys.stderr, flush=True)
-
-    def _begin(self, town_name: str) -> Episode:
-        """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
-        town = load_town(town_name)
+    def _suitable(self, name: str) -> Town:
+        """A town with room for an episode. Raises ValueError, OSError or RuntimeError where there is none."""
+        town = load_town(name)
         if town.roads.offset != (0.0, 0.0):
             raise ValueError(
-                f"found that {town_name} lies far from the origin of its map, wanted one within 5 km: move the map"
+                f"found that {name} lies far from the origin of its map, wanted one within 5 km: move the map"
             )
+        require_room(town.roads, self.settings.cars, self.settings.people)
+        signal_ids(name, town.roads)  # what cannot be read is found here
+        return town
+
+    def _begin(self, town: Town) -> Episode:
+        """A new episode in a town. Raises ValueError, OSError or RuntimeError where there cannot be one."""
         self._episodes += 1
-        episode = Episode(self._episodes, town, self.settings, signal_ids(town_name, town.roads), self._numbers)
+        episode = Episode(self._episodes, town, self.settings, signal_ids(town.name, town.roads), self._numbers)
         if self._senses.town is not town:
             self._senses.close()
             self._senses = Senses(town)
         return episode
 
-    def begin(self, town: str | None = None) -> None:
+    def begin(self, name: str | None = None) -> None:
         """Ends the episode and begins another, in the same town or another. Raises ValueError, OSError or RuntimeError
-        where there cannot be one; then the old town begins again.
+        where there cannot be one: a town that does not suit costs nothing, and one in which nothing moves is left for
+        the old one, which begins again.
 
         Who subscribes already hears of it with the next step, which the clock makes after a while: a client that loads
         a world leaves its old subscription, and crashes where something comes in on it at that moment."""
-        old = self.episode.town.name
-        load_town(town or old)  # a map that cannot be read costs nothing
+        old = self.episode.town
+        town = self._suitable(name) if name else old
         for actor in self.sensors():
             self.streams.close_stream(actor.stream)
         self.episode.close()
         self._pace.begin_loaded()
         try:
-            self.episode = self._begin(town or old)
+            self.episode = self._begin(town)
         except (ValueError, OSError, RuntimeError):
             self.episode = self._begin(old)
             raise
@@ -107,7 +113,13 @@ class Server:
         """Does once what clients would have to wait for the first time; then all is as it was."""
         self.episode.step(FREE_STEP)
         self._senses.warm_up(self.episode)
-        self.begin()
+        self._start_over()
+
+    def _start_over(self) -> None:
+        """All is as the first client finds it, to its numbers."""
+        self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
+        self._rules.clear()
+        self._begin_again(self.settings.town)
         self._pace.begin()
 
     def run(self) -> None:
@@ -158,6 +170,7 @@ class Server:
             self._pace.hear()
         try:
             result = serve(self.calls, caller, request)
+            self._refusals.note(caller, request, result)
         except Exception as error:  # the last door before everybody's world
             self.log(f"found a fault of the program in {request.method} ({type(error).__name__}: {error}), wanted none")
             return turned_down(
@@ -170,17 +183,15 @@ class Server:
 
     def _forget(self, client: int) -> None:
         """A client has gone, and what was its own goes with it."""
+        self._refusals.forget(client)
         self.managers = {port: row for port, row in self.managers.items() if row[1] != client}
         if self.settings.keep:
             return
         if client in self._rules:
             del self._rules[client]
             self._pace.go_on()
-        if not self.clients:  # who comes next finds what the first one found
-            self.frame, self._episodes, self._numbers = FIRST_FRAME, 0, count(1)
-            self._rules.clear()
-            self._begin_again(self.settings.town)
-            self._pace.begin()
+        if not self.clients:
+            self._start_over()
             return
         for actor in self.episode.all(Actor):
             if actor.owner == client and self.episode.get(actor.id) is actor:
@@ -224,18 +235,9 @@ class Server:
                 for message in self._senses.heard(sensor, self.episode, self.frame, self.log):
                     self.streams.send(sensor.stream, message)
                     heard.append((sensor, message))
-        self._record(heard)
+        if self._recording is not None:
+            self._recording.step(self.episode, heard, self.log)
         return self.frame
-
-    def _record(self, heard: Sequence[tuple[SensorActor, Message]]) -> None:
-        """Takes down the last step. A full disk ends the recording, and not the server."""
-        if self._recording is None:
-            return
-        try:
-            self._recording.step(self.episode, heard)
-        except OSError as error:
-            self.log(f"found that {self.settings.record} cannot be written ({error.strerror}), wanted room: it ends")
-            self._recording = None
 
     def _show(self) -> None:
         """Tells everybody who is where now: a frame."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from typing import Any
 
+from caldrive.carla_bridge.server.actor_calls import finite
 from caldrive.carla_bridge.server.calls import call
 from caldrive.carla_bridge.server.layouts import Settings, Weather, transform
 from caldrive.carla_bridge.server.maps import PREFIX, map_name, opendrive, spawn_points
@@ -139,12 +140,13 @@ class SessionCalls:
 
     @call("get_imui_gravity")
     def gravity(self, caller: int) -> float:
-        """m/s²."""
-        return 9.81
+        """m/s² that IMUs feel."""
+        return self._server.episode.gravity
 
     @call("set_imui_gravity")
     def set_gravity(self, caller: int, gravity: float) -> None:
-        """It stays as it is."""
+        """Another one, for IMUs alone."""
+        self._server.episode.gravity = finite(gravity, 1e3)
 
     @call("query_lights_state")
     def street_lights(self, caller: int, endpoint: str = "") -> list[Any]:

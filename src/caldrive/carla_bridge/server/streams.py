@@ -2,6 +2,9 @@
 
 A client asks for a stream's token by a call, connects to the port in it, and writes the stream's number; then messages
 come, each behind its size. Who reads too slowly misses messages; who does not read at all is cut off.
+
+CARLA's client comes again at once, and for ever, where a connection is closed. So those to a stream that has ended stay
+open, and nothing comes on them.
 """
 
 from __future__ import annotations
@@ -14,7 +17,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from caldrive.carla_bridge.server.outbox import Gone, Log, Outbox, accepted
+from caldrive.carla_bridge.server.log import Log
+from caldrive.carla_bridge.server.outbox import Gone, Outbox, accepted
 
 WORLD = 1  # the stream of snapshots
 TOKEN = struct.Struct("<IHBB16x")
@@ -23,6 +27,8 @@ MOST_WAITING = 16_000_000  # bytes that a subscriber may be behind; the largest 
 PATIENCE = 1.0  # s that the world waits for subscribers who are announced, and for those who are behind
 STALLED = 10.0  # s without reading anything after which a slow subscriber is cut off
 MOST_SUBSCRIBERS = 512
+MOST_PARKED = 256  # connections to streams that have ended
+SILENCE = 10.0  # s in which whoever connects has to say which stream they want
 
 
 class Subscriber:
@@ -31,7 +37,7 @@ class Subscriber:
     def __init__(self, connection: socket.socket) -> None:
         self.socket, self.outbox = connection, Outbox(connection)
         self.stream: int | None = None
-        self._said = b""
+        self.came, self._said = time.monotonic(), b""
 
     def hear(self) -> bool:
         """Whether it has said now which stream it wants. Raises Gone, as for anything that it says later."""
@@ -60,7 +66,8 @@ class Streams:
         self.port = int(waiting.getsockname()[1])
         self._selector = selectors.DefaultSelector()
         self._selector.register(waiting, selectors.EVENT_READ)
-        self._subscribers: set[Subscriber] = set()
+        self._subscribers: dict[Subscriber, None] = {}  # in the order in which they came
+        self._parked: dict[Subscriber, None] = {}  # those of them whose stream has ended
         self._by_stream: dict[int, list[Subscriber]] = {}
         self._announced: Counter[int] = Counter()
         self._open: set[int] = set()  # those that somebody has a token of
@@ -112,7 +119,7 @@ class Streams:
         self._open.discard(stream)
         self._announced.pop(stream, None)  # nobody will come for it any more
         for subscriber in self._by_stream.pop(stream, []):
-            self._drop(subscriber)
+            self._park(subscriber)
 
     def settle(self) -> None:
         """Waits a moment for subscribers who are announced, and for those who are behind; not for slow ones."""
@@ -142,18 +149,25 @@ class Streams:
 
     def _let_in(self) -> None:
         while (connection := accepted(self._waiting)) is not None:
-            if len(self._subscribers) >= MOST_SUBSCRIBERS:
-                self._log(f"a subscriber was turned away, as there are {MOST_SUBSCRIBERS}")
+            self._drop_silent()
+            if len(self._subscribers) - len(self._parked) >= MOST_SUBSCRIBERS:
+                self._log.rarely("a subscriber was turned away", f"as there are {MOST_SUBSCRIBERS}")
                 connection.close()
                 continue
             subscriber = Subscriber(connection)
-            self._subscribers.add(subscriber)
+            self._subscribers[subscriber] = None
             self._selector.register(connection, selectors.EVENT_READ, subscriber)
 
+    def _drop_silent(self) -> None:
+        """Makes room: who has not said what they want will not."""
+        latest = time.monotonic() - SILENCE
+        for subscriber in [one for one in self._subscribers if one.stream is None and one.came < latest]:
+            self._drop(subscriber)
+
     def _subscribe(self, subscriber: Subscriber, stream: int) -> None:
-        """Raises Gone where there is no such stream, or no longer: nothing would ever come."""
         if stream not in self._open:
-            raise Gone
+            self._park(subscriber)
+            return
         self._by_stream.setdefault(stream, []).append(subscriber)
         self._announced[stream] -= 1
         if self._announced[stream] <= 0:
@@ -161,6 +175,16 @@ class Streams:
         first = self._newcomer(stream)
         if first is not None:
             self._put(subscriber, first)
+
+    def _park(self, subscriber: Subscriber) -> None:
+        """Nothing comes any more. Who has not read what came before starts anew."""
+        self._slow.pop(subscriber, None)
+        if subscriber.outbox.waiting:
+            self._drop(subscriber)
+            return
+        self._parked[subscriber] = None
+        if len(self._parked) > MOST_PARKED:
+            self._drop(next(iter(self._parked)))
 
     def _put(self, subscriber: Subscriber, pieces: Sequence[Any]) -> None:
         size = sum(memoryview(piece).nbytes for piece in pieces)
@@ -180,7 +204,8 @@ class Streams:
     def _drop(self, subscriber: Subscriber) -> None:
         if subscriber not in self._subscribers:
             return
-        self._subscribers.discard(subscriber)
+        del self._subscribers[subscriber]
+        self._parked.pop(subscriber, None)
         self._slow.pop(subscriber, None)
         stream = subscriber.stream
         if stream is not None and subscriber in self._by_stream.get(stream, ()):

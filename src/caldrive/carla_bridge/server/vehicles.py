@@ -28,6 +28,7 @@ ENGINE_BRAKE = 0.5  # of the brake: what a gear against the motion does
 AXLES = 0.62  # of the length lie between them
 FULL_THROTTLE, FULL_BRAKE = 3.0, 8.0  # m/s² that a whole pedal is worth to the Ackermann controller
 CM = 100.0  # in a m
+WIDEST = 80.0  # degrees that a wheel may turn
 
 
 @dataclass(eq=False)
@@ -57,9 +58,9 @@ class Vehicle(Actor):
 
     @property
     def place(self) -> Placement:
-        """Where it is; what has no physics may hover."""
-        pose, own = self.state.pose, self.own_place
-        return standing(pose) if self.has_physics else replace(own, x=pose.x, y=pose.y, heading=pose.heading)
+        """Where it is; what has no physics may hover, and what is below the ground stays there."""
+        pose, own, is_held = self.state.pose, self.own_place, self.is_aside or not self.has_physics
+        return replace(own, x=pose.x, y=pose.y, heading=pose.heading) if is_held else standing(pose)
 
     def put(self, place: Placement) -> None:
         """It is at a place from now on, and keeps its speed."""
@@ -75,7 +76,7 @@ class Vehicle(Actor):
     def step(self, dt: float) -> None:
         """Drives on for dt seconds."""
         before = self.state
-        if not self.has_physics:
+        if self.is_aside or not self.has_physics:
             self.state, self.motion = replace(before, speed=0.0, acceleration=0.0), STILL
             return
         if self.ackermann is not None:
@@ -189,7 +190,9 @@ def set_physics(vehicle: Vehicle, physics: PhysicsControl) -> None:
     if not physics.mass >= 1.0:
         raise Refusal(f"found a mass of {physics.mass} kg, wanted 1 kg at least: give another one")
     angles = [wheel.max_steer_angle for wheel in physics.wheels[:2]]
-    if angles and 1.0 <= max(angles) <= 80.0:
+    if angles and not (all(0.0 <= angle <= WIDEST for angle in angles) and max(angles) >= 1.0):
+        raise Refusal(f"found max_steer_angle {angles} of the front wheels, wanted 1 to {WIDEST:g} degrees: set others")
+    if angles:
         vehicle.config = replace(vehicle.config, max_steer=math.radians(max(angles)))
     wheels = own_wheels(physics, vehicle.physics, vehicle.friction_here)
     vehicle.physics = msgspec.structs.replace(physics, wheels=wheels)

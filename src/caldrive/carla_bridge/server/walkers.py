@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from caldrive.carla_bridge.axes import Placement, vector_to_carla
-from caldrive.carla_bridge.server.actors import Actor
+from caldrive.carla_bridge.server.actors import STILL, Actor
 from caldrive.carla_bridge.server.layouts import WalkerControl
 from caldrive.carla_bridge.server.snapshot import NOTHING
 from caldrive.datatypes import PedestrianState, Pose
@@ -34,6 +34,9 @@ class Walker(Actor):
     def step(self, dt: float) -> None:
         """Walks on for dt seconds."""
         at, control = self.own_place, self.control
+        if self.is_aside:
+            self.motion, self.before = STILL, at.pose
+            return
         if self.by_crowd is None:
             direction, speed = control.direction, min(max(control.speed, 0.0), FASTEST)
             size = math.hypot(direction.x, direction.y)

@@ -30,6 +30,8 @@ class Request(NamedTuple):
     id: int
     method: str
     arguments: list[Any]
+    is_heard: bool = True
+    """Whether the client waits for the answer."""
 
 
 class Requests:
@@ -51,8 +53,8 @@ class Requests:
 
 def _request(message: Any) -> Request:
     match message:
-        case [0, int(id), str(method), [_, *arguments]]:
-            return Request(id, method, arguments)
+        case [0, int(id), str(method), [metadata, *arguments]]:
+            return Request(id, method, arguments, is_heard=metadata != [True])
         case _:
             raise BrokenMessage(f"a {type(message).__name__} that is no request")
 
@@ -75,3 +77,11 @@ def served(value: Any, is_void: bool) -> Any:
 def refused(text: str, is_void: bool) -> Any:
     """A result that a client raises as RuntimeError with this text."""
     return ((True, (text,)),) if is_void else ((0, (text,)),)
+
+
+def refusal_in(result: Any) -> str | None:
+    """The text of such a result, None of another."""
+    match result:
+        case ((True | 0, (str(text),)),):
+            return text
+    return None

@@ -14,9 +14,11 @@ from caldrive.carla_bridge.server.layouts import BoundingBox, Rotation, Transfor
 from caldrive.carla_bridge.server.server import Server
 from caldrive.carla_bridge.server.wire import Refusal
 from caldrive.datatypes import Pose, VehicleState
+from caldrive.world.roads.network import SIDEWALK_WIDTH
 from caldrive.world.scene.scenery import Prop
 
 ANY = 255  # the label of everything
+FARTHEST = 1e7  # m from the origin where there is still ground
 PROP_LABELS = {
     "building": Label.BUILDING, "wall": Label.WALL, "fence": Label.FENCE, "lamp": Label.POLE, "light_post": Label.LIGHT,
     "sign_post": Label.SIGN, "tree": Label.VEGETATION, "hedge": Label.VEGETATION,
@@ -81,8 +83,9 @@ class WorldCalls:
     def project(self, caller: int, at: Vector, direction: Vector, distance: float) -> tuple[bool, Any]:
         """Where a ray meets the ground, which is flat and the only thing that it can meet."""
         along = -at.z / direction.z if direction.z else math.inf
-        meets = 0.0 <= along <= distance
-        x, y = (at.x + along * direction.x, at.y + along * direction.y) if meets else (0.0, 0.0)
+        x, y = at.x + along * direction.x, at.y + along * direction.y
+        meets = 0.0 <= along <= distance and abs(x) < FARTHEST and abs(y) < FARTHEST
+        x, y = (x, y) if meets else (0.0, 0.0)
         return meets, (Vector(x, y, 0.0), self._ground(x, y))
 
     @call("cast_ray")
@@ -93,7 +96,8 @@ class WorldCalls:
         return [point] if meets else []
 
     def _ground(self, x: float, y: float) -> int:
-        return Label.ROAD if shapely.contains_xy(self._server.episode.town.roads.roadway, x, -y) else Label.SIDEWALK
+        away = shapely.distance(self._server.episode.town.roads.roadway, shapely.Point(x, -y))
+        return Label.ROAD if away == 0.0 else Label.SIDEWALK if away <= SIDEWALK_WIDTH else Label.TERRAIN
 
 
 def _label(prop: Prop) -> int:
