@@ -2,9 +2,9 @@
 
     python -m scripts.carla_peer --agent cal --tasks straight one-turn navigation
 
-Prints how each episode of the quick suite in town01 went on both sides, and ends with 1 where outcomes differ. Lights
-change at other times on the two sides, as a server's clock does not begin with an episode; so times differ. Who else
-is there drives by CARLA's traffic manager on one side and by SUMO on the other.
+Prints how each episode of the quick suite went on both sides, and ends with 1 where outcomes differ. Each
+episode has a server of its own with the scenario's seed, so that the lights begin alike; the server's clock is about a
+second ahead. Who else is there drives by CARLA's traffic manager on one side and by SUMO on the other.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import tyro
 
@@ -22,9 +22,9 @@ from caldrive.benchmark.suites import Trial, suite
 from caldrive.driving.rollout import run_episode
 from caldrive.driving.settings import DriverSettings
 from caldrive.driving.setup import set_up
+from caldrive.driving.tasks import TASKS
 from caldrive.results import EpisodeResult
-
-TOWN = "town01"
+from caldrive.scenarios import TOWNS, Scenario
 
 
 @dataclass(frozen=True)
@@ -33,18 +33,19 @@ class Options:
 
     agent: str = "cal"
     """As in caldrive drive."""
-    tasks: tuple[str, ...] = ("straight", "one-turn", "navigation")
-    """Of the quick suite; navigation-dynamic has cars and people."""
-    episodes: int = 12
-    """At most so many."""
+    towns: tuple[str, ...] = TOWNS
+    """Of the quick suite."""
+    tasks: tuple[str, ...] = TASKS
+    """Likewise; navigation-dynamic has cars and people."""
     port: int = 2000
     """Of the server that is started."""
 
 
 @contextmanager
-def served(port: int, *more: str) -> Iterator[None]:
-    """A server of the town while it is needed. Raises RuntimeError where it ends by itself."""
-    command = [sys.executable, "-m", "caldrive", "serve-carla", "--town", TOWN, "--port", str(port), *more]
+def served(port: int, scenario: Scenario) -> Iterator[None]:
+    """A server of a scenario's town and seed while it is needed. Raises RuntimeError where it ends by itself."""
+    where = ["--town", scenario.town, "--seed", str(scenario.seed), "--port", str(port)]
+    command = [sys.executable, "-m", "caldrive", "serve-carla", *where]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None
@@ -55,11 +56,11 @@ def served(port: int, *more: str) -> Iterator[None]:
             process.terminate()
 
 
-def drive(driver: DriverSettings, trials: list[Trial]) -> list[EpisodeResult]:
-    """How each trial goes."""
+def drive(driver: DriverSettings, trial: Trial) -> EpisodeResult:
+    """How a trial goes."""
     world, agent = set_up(driver)
     with closing(world):
-        return [run_episode(world, agent, trial.scenario, referee=make_referee(driver, trial)) for trial in trials]
+        return run_episode(world, agent, trial.scenario, referee=make_referee(driver, trial))
 
 
 def said(result: EpisodeResult) -> str:
@@ -70,14 +71,14 @@ def said(result: EpisodeResult) -> str:
 
 def main(options: Options) -> int:
     """Returns 1 where outcomes differ."""
-    trials = [t for t in suite("quick") if t.scenario.town == TOWN and t.scenario.task in options.tasks]
-    trials = trials[: options.episodes]
-    here = drive(DriverSettings(agent=options.agent, cap=20.0), trials)
-    with served(options.port):
-        there = drive(DriverSettings(agent=options.agent, cap=20.0, world="carla", port=options.port), trials)
-    for trial, embedded, through in zip(trials, here, there, strict=True):
-        print(f"{trial.key}\n  embedded          {said(embedded)}\n  through protocol  {said(through)}")
-    equal = sum(one.outcome is other.outcome for one, other in zip(here, there, strict=True))
+    trials = [t for t in suite("quick") if t.scenario.town in options.towns and t.scenario.task in options.tasks]
+    equal, driver = 0, DriverSettings(agent=options.agent, cap=20.0)
+    for trial in trials:
+        embedded = drive(driver, trial)
+        with served(options.port, trial.scenario):
+            through = drive(replace(driver, world="carla", port=options.port), trial)
+        equal += embedded.outcome is through.outcome
+        print(f"{trial.key}\n  embedded          {said(embedded)}\n  through protocol  {said(through)}", flush=True)
     print(f"same outcome in {equal} of {len(trials)} episodes")
     return int(equal < len(trials))
 
