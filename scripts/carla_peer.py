@@ -42,10 +42,10 @@ class Options:
 
 
 @contextmanager
-def served(port: int, scenario: Scenario) -> Iterator[None]:
+def served(port: int, scenario: Scenario, *options: str) -> Iterator[None]:
     """A server of a scenario's town and seed while it is needed. Raises RuntimeError where it ends by itself."""
     where = ["--town", scenario.town, "--seed", str(scenario.seed), "--port", str(port)]
-    command = [sys.executable, "-m", "caldrive", "serve-carla", *where]
+    command = [sys.executable, "-m", "caldrive", "serve-carla", *where, *options]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None

@@ -24,8 +24,9 @@ import tyro
 from caldrive.datatypes import CameraConfig, Control
 from caldrive.driving.tasks import task_scenarios
 from caldrive.provenance import machine_name
+from caldrive.scenarios import Scenario
 from caldrive.world.embedded import EmbeddedWorld
-from scripts.carla_peer import TOWN, served
+from scripts.carla_peer import served
 
 PATIENCE = 60.0  # s for a picture
 
@@ -54,9 +55,8 @@ class Side(NamedTuple):
     step: Callable[[], Any]
 
 
-def embedded(world: EmbeddedWorld, cars: int) -> Side:
+def embedded(world: EmbeddedWorld, scenario: Scenario) -> Side:
     """The embedded world."""
-    scenario = replace(task_scenarios(TOWN, "navigation", weather=1)[0], n_vehicles=cars, n_pedestrians=0)
     return Side(lambda: world.reset(scenario), lambda: world.step(Control(throttle=0.4)))
 
 
@@ -105,11 +105,12 @@ def main() -> None:
     """Measures, and prints medians."""
     options = tyro.cli(Options, description=__doc__)
     width, height = options.size
+    scenario = replace(task_scenarios("town01", "navigation", weather=1)[0], n_vehicles=options.cars, n_pedestrians=0)
     with (
-        served(options.port, "--cars", str(options.cars)),
+        served(options.port, scenario, "--cars", str(options.cars)),
         closing(EmbeddedWorld(CameraConfig(width=width, height=height))) as world,
     ):
-        sides = embedded(world, options.cars), through_client(options)
+        sides = embedded(world, scenario), through_client(options)
         for side in sides:
             steps_a_second(side, 20)
         turns = [[steps_a_second(side, options.steps) for side in sides] for _ in range(options.turns)]
