@@ -12,7 +12,7 @@ import os
 import platform
 from pathlib import Path
 
-BEHAVIOUR_VERSION = 10
+BEHAVIOUR_VERSION = 11
 
 
 def code_version() -> str:

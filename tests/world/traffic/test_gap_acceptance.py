@@ -136,6 +136,16 @@ def test_whoever_is_before_a_car_may_leave(speed: float, left: float) -> None:
     assert bumps(place, (0.0, 0.14), cars)
 
 
+@pytest.mark.parametrize("curvature", [0.0, 0.1, -0.2])
+def test_whoever_waits_before_a_standing_car_may_leave_it_to_one_side(curvature: float) -> None:
+    """However far before it they stand, and though both ways may lead a little nearer."""
+    cars, rng = Cars(boxes_of([car(0.0)]), curvature, curvature), np.random.default_rng(0)
+    for ahead, left, on, back, pace in rng.uniform((0.1, -1.3, -0.4, -0.4, 0.9), (1.5, 1.3, 0.4, 0.4, 3.2), (2000, 5)):
+        place, step = np.array((2.1 + ahead, left)), 0.1 * pace
+        ways = ((-step * math.sin(on), step * math.cos(on)), (-step * math.sin(back), -step * math.cos(back)))
+        assert not all(bumps(place, way, cars) for way in ways)
+
+
 def test_an_unsteady_driver_is_no_reason_to_be_careful() -> None:
     """Or the test would be easier for those who drive worse."""
     lately, place = 0.0, np.array((2.1 + 6.0, -2.06))

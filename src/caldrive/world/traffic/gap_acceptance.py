@@ -29,6 +29,7 @@ REACTION, HARD_BRAKE, SPARE = 0.3, 6.5, 0.8
 EGO = 0  # its row among the boxes
 BODY, TOUCH = 1.35, 0.45  # m: half of a car and of a person beside it, and from its ends, with some room
 FULL_BRAKE, LEFT_OVER = 7.0, 0.3  # m/s² of a driver who brakes already, and m that remain
+STEP = 0.35  # m that somebody who runs gets on in a step
 DRIFT = 0.3  # m by which who stands beside a car's path may come to lie in it, as that changes
 REAR = 0.6  # halves of a car's length from its middle back to its rear axle
 STRAIGHT = 0.02  # 1/m: less curved paths are as good as straight
@@ -85,6 +86,8 @@ def bumps(position: Points, step: tuple[float, float], cars: Cars) -> bool:
     for look in range(_looks(cars)):
         car, curvature = _looked_at(cars, look)
         box = cars.boxes[car]
+        if _leaves(position, step, box):
+            continue
         if _is_bumped(position, step, box, curvature, _reach(position, box, curvature)):
             return True
         if curvature != 0 and _is_bumped(position, step, box, 0.0, TOUCH):  # its body does not bend with its path
@@ -170,6 +173,16 @@ def _is_bumped(position: Points, step: tuple[float, float], box: Floats, curvatu
     # Who is before a car goes on, so as to leave; but nobody comes nearer to one that is beside them, or nearly past.
     may_stay = ahead < TOUCH or abs(left) > body - DRIFT
     return bool(will_be and (not is_near or (may_stay and abs(then_left) < abs(left))))
+
+
+@inlined
+def _leaves(position: Points, step: tuple[float, float], box: Floats) -> bool:
+    """Whether a step leads somebody who is before a standing car rather aside than nearer: they must not stay there
+    because it brings them a little nearer, as that car would stay, too."""
+    ahead, left = _before(box, position[0], position[1], 0.0)
+    then_ahead, then_left = _before(box, position[0] + step[0], position[1] + step[1], 0.0)
+    is_before = -2 * box[4] - TOUCH < ahead < TOUCH + STEP and abs(left) < BODY
+    return bool(box[3] <= MOVING and is_before and abs(then_left) - abs(left) > abs(then_ahead - ahead))
 
 
 @inlined
