@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from caldrive.datatypes import Pose
 from caldrive.geometry import (
     Polyline,
+    added_up,
     box_corners,
     boxes_overlap,
     mitres,
@@ -25,6 +26,14 @@ POSES = st.builds(Pose, METRES, METRES, st.floats(-math.pi, math.pi))
 POINTS = st.lists(st.tuples(METRES, METRES), min_size=1, max_size=5).map(np.array)
 BOXES = st.builds(box_corners, POSES, st.floats(0.5, 10), st.floats(0.5, 5))
 UNIT = box_corners(Pose(0, 0, 0), 2, 2)
+
+
+def test_numbers_are_added_up_in_turn_with_every_python() -> None:
+    """As `sum` did before Python 3.12, to the last bit."""
+    numbers = [0.1] * 10
+    assert added_up(numbers) == 0.9999999999999999
+    assert added_up(iter(numbers)) == 0.9999999999999999
+    assert added_up([]) == 0.0
 
 
 @given(st.floats(-1000, 1000))

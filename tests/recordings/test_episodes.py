@@ -48,7 +48,7 @@ def test_gives_back_what_was_written(path: Path) -> None:
     assert len(episode) == 6
     for frame, (camera, index) in zip(episode, [(c, i) for c in (0, 1) for i in range(3)], strict=True):
         written = make_frame(index, index / 4, hazard=index == 2, camera=camera)
-        assert replace(frame, image=written.image) == written
+        assert vars(frame) | {"image": None} == vars(written) | {"image": None}
 
 
 def test_images_survive_jpeg_in_their_own_colours(path: Path) -> None:

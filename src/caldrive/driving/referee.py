@@ -27,7 +27,7 @@ from caldrive.driving.rules import (
     Rules,
 )
 from caldrive.driving.speeding import SpeedWatch
-from caldrive.geometry import moved, wrap_angle
+from caldrive.geometry import added_up, moved, wrap_angle
 from caldrive.results import EpisodeResult, Infraction, InfractionKind, Outcome
 from caldrive.scenarios import Scenario
 
@@ -163,7 +163,7 @@ class Referee:
     def _hit(self, kind: ContactKind, intensity: Intensity) -> bool | None:
         """Whether contacts of a kind that add up to a collision are the ego's fault, None where they are too soft."""
         recent = [c for frame in list(self._contacts)[-intensity.frames :] for c in frame if c.kind is kind]
-        is_hard = sum(contact.impulse for contact in recent) > intensity.least
+        is_hard = added_up(contact.impulse for contact in recent) > intensity.least
         return any(contact.at_fault for contact in recent) if is_hard else None
 
     def _watch_lights(self, truth: Truth) -> None:

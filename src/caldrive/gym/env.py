@@ -13,6 +13,7 @@ from caldrive.driving.referee import Referee
 from caldrive.driving.rules import RULES
 from caldrive.driving.setup import make_world
 from caldrive.driving.tasks import task_scenarios
+from caldrive.geometry import added_up
 from caldrive.gym.config import EnvConfig, configured
 from caldrive.gym.rewards import PRESETS, Transition
 from caldrive.gym.spaces import action_space, observation_space, observed
@@ -96,7 +97,7 @@ class DrivingEnv(gymnasium.Env[dict[str, Any], Any]):
             observation = self._move(drive, control, total)
             if drive.has_ended:
                 break
-        reward, outcome = sum(total.values()), drive.referee.outcome
+        reward, outcome = added_up(total.values()), drive.referee.outcome
         drive.reward += reward
         drive.length += 1
         cost = float(len(drive.referee.infractions) - known)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from caldrive.datatypes import KMH, Control, LightState, Truth
-from caldrive.geometry import to_local, wrap_angle
+from caldrive.geometry import added_up, to_local, wrap_angle
 
 MOST_WANTED = 6.0  # m/s, the speed that `roach` wants on a free road
 ROOM = 5.0  # m over which it falls to 0
@@ -59,7 +59,7 @@ def carla2017_terms(transition: Transition) -> dict[str, float]:
     return {
         "distance": (now.route_done - before.route_done) / 1000,
         "speed": (now.ego.speed - before.ego.speed) / KMH,
-        "damage": -sum(contact.impulse for contact in now.contacts),
+        "damage": added_up(-contact.impulse for contact in now.contacts),
         "sidewalk": -(now.sidewalk_share - before.sidewalk_share),
         "opposite_lane": -(now.opposite_share - before.opposite_share),
     }

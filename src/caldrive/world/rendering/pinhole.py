@@ -11,7 +11,7 @@ import numpy as np
 from caldrive.checks import MOST_PIXELS
 from caldrive.compiled import Floats, f32
 from caldrive.datatypes import CameraConfig, Pose, VehicleState
-from caldrive.geometry import moved
+from caldrive.geometry import added_up, moved
 
 LEVEL = 0.1  # rad of pitch and roll up to which the horizontal angle alone says what a picture covers
 ALL_AROUND = 1e3  # tangent of half an angle that covers everything ahead
@@ -103,7 +103,7 @@ class PinholeCamera:
         numbers: list[float] = []
         for axis, scale in ((right, 2 * focal / width), (down, 2 * focal / height), (ahead, 1.0)):
             numbers += [scale * a for a in axis]
-            numbers.append(-scale * sum(a * at for a, at in zip(axis, position, strict=True)))
+            numbers.append(-scale * added_up(a * at for a, at in zip(axis, position, strict=True)))
         x, y = (1 - width) / (2 * focal), (1 - height) / (2 * focal)  # the middle of the first pixel
         numbers += [*position, *(a + x * r + y * d for a, r, d in zip(ahead, right, down, strict=True))]
         numbers += [*(r / focal for r in right), *(d / focal for d in down), *frustum.ahead, *frustum.left]

@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from caldrive.datatypes import Command, Pose, Sign
-from caldrive.geometry import Polyline, moved
+from caldrive.geometry import Polyline, added_up, moved
 
 SIDEWALK_WIDTH = 3.0  # m
 POST_BESIDE_LANE = 1.1  # m from the kerb to the foot of a post
@@ -169,7 +169,7 @@ class RoadNetwork:
     @cached_property
     def road_length(self) -> float:
         """m of all streets, each of its two ways counted, its lanes beside each other not."""
-        return sum({lane.edge: lane.line.length for lane in self.driveable}.values())
+        return added_up({lane.edge: lane.line.length for lane in self.driveable}.values())
 
     @cached_property
     def predecessors(self) -> dict[str, list[str]]:

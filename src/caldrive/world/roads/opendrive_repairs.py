@@ -12,6 +12,7 @@ from itertools import pairwise
 from xml.etree import ElementTree as ET
 
 from caldrive.datatypes import KMH
+from caldrive.geometry import added_up
 from caldrive.world.roads.reference_line import curvatures, number, shape_of
 
 CAR_LANES = frozenset({
@@ -83,7 +84,7 @@ def _mend_line(road: ET.Element) -> Dropped:
         for name in _NUMBERS.get(element.tag, ()):
             element.set(name, element.get(name) or "0")
     pieces = road.findall("planView/geometry")
-    road.set("length", road.get("length") or repr(sum(number(piece, "length") for piece in pieces)))
+    road.set("length", road.get("length") or repr(added_up(number(piece, "length") for piece in pieces)))
     for geometry in pieces:
         shape = shape_of(geometry)
         if shape is None:

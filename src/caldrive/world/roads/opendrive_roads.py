@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from caldrive.datatypes import Pose
-from caldrive.geometry import Polyline, mitres, moved, to_local
+from caldrive.geometry import Polyline, added_up, mitres, moved, to_local
 from caldrive.world.roads.network import SIDEWALK_WIDTH, RoadNetwork
 from caldrive.world.roads.rounded_line import Piece, pieces_of, thinned
 from caldrive.world.roads.two_way_streets import Edge, Street, Turn, find_streets
@@ -86,7 +86,7 @@ class OpenDriveRoad:
     @cached_property
     def length(self) -> float:
         """Of the smooth line, m."""
-        return sum(piece.length for piece in self.pieces)
+        return added_up(piece.length for piece in self.pieces)
 
     def locate(self, x: float, y: float) -> tuple[float, float]:
         """A place as m along the smooth line, and to its left."""
@@ -99,7 +99,7 @@ class OpenDriveRoad:
     def middle(self, lane: int) -> float:
         """m from the reference line to the left, where a lane's middle is."""
         widths = (self.right if lane < 0 else self.left).widths
-        across = sum(widths[: abs(lane) - 1]) + widths[abs(lane) - 1] / 2
+        across = added_up(widths[: abs(lane) - 1]) + widths[abs(lane) - 1] / 2
         return self.offset + (-across if lane < 0 else across)
 
     def end_of(self, lane: int, *, leaving: bool) -> Pose:
@@ -196,7 +196,7 @@ def _contact(road: OpenDriveRoad, street: OpenDriveRoad, lane: int, *, leaving: 
 
 def _with_sidewalks(roads: RoadNetwork, road: OpenDriveRoad) -> OpenDriveRoad:
     """A road with the sidewalks that run along all of it."""
-    edges = (road.offset - sum(road.right.widths), road.offset + sum(road.left.widths))
+    edges = (road.offset - added_up(road.right.widths), road.offset + added_up(road.left.widths))
     right, left = edges[0] - SIDEWALK_WIDTH / 2, edges[1] + SIDEWALK_WIDTH / 2
     return replace(
         road,

@@ -15,7 +15,7 @@ import networkx as nx
 import numpy as np
 
 from caldrive.datatypes import KMH, Command, Points, Pose
-from caldrive.geometry import Polyline
+from caldrive.geometry import Polyline, added_up
 from caldrive.world.roads.lane_changes import CHANGE_ROOM, LaneChange, across, middles_of_changes, stretches_of
 from caldrive.world.roads.network import Lane, RoadNetwork
 
@@ -126,7 +126,7 @@ def follow_lanes(roads: RoadNetwork, ids: list[str], start: float, end: float) -
     on the last. Raises ValueError where they are all but one place."""
     driven = stretches_of(roads, ids)
     begin = start * (driven[0][-1].line.length / driven[0][0].line.length)  # on the lane that it changes to
-    length = sum(stretch[-1].line.length for stretch in driven[:-1]) - begin + end
+    length = added_up(stretch[-1].line.length for stretch in driven[:-1]) - begin + end
     reached = length + driven[-1][-1].line.length - end
     stretches = [*driven, *_beyond(roads, driven[-1][-1], reached, length + BEYOND_GOAL)]
     begins = np.cumsum([-begin] + [stretch[-1].line.length for stretch in stretches[:-1]]).tolist()
@@ -204,7 +204,7 @@ def _shortest(roads: RoadNetwork, graph: nx.DiGraph, first: str, last: Lane) -> 
 def _cost(roads: RoadNetwork, ids: list[str]) -> float:
     """m of a way, with what its lane changes count for."""
     stretches = stretches_of(roads, ids)
-    length = sum(stretch[-1].line.length for stretch in stretches)
+    length = added_up(stretch[-1].line.length for stretch in stretches)
     return length + CHANGE_COST * (len(ids) - len(stretches))
 
 
